@@ -1,0 +1,16 @@
+"""RAPTOR: rapid prediction of tissue organisation.
+
+CONDOR, a model of force-dipole cells on a face-centred-cubic spring network, simulates how a
+cell-laden hydrogel contracts in a tethered mould; a pix2pix network trained on thousands of such
+simulations predicts the same fields in a fraction of a second.
+
+Source of the methods: A. E. Andrews et al., "Rapid prediction of organisation in engineered
+corneal, glial and fibroblast tissues using machine learning and biophysical models" (2025).
+"""
+
+from importlib.metadata import version
+
+__version__ = version("raptor-tissue")
+
+MODEL_VERSION = 1
+"""Raised whenever a change of code changes results: it travels in rule parameters and in files."""

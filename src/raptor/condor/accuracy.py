@@ -1,0 +1,195 @@
+"""One simulation, at the accuracy that a user asks for."""
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from raptor.condor.anneal import anneal
+from raptor.condor.contract import Contraction, contract
+from raptor.condor.energy import cell_tension, folded_fraction
+from raptor.condor.lattice import Lattice, build_lattice
+from raptor.condor.minimise import Minimum
+from raptor.condor.network import Network, build_network
+from raptor.condor.walls import Walls, build_walls
+from raptor.errors import RaptorError
+from raptor.moulds.geometry import Mould
+from raptor.parameters import CellParameters, NetworkModel
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """A solver and its tolerances: contraction, then optionally a warm anneal, then the last minimum.
+
+    Parameters
+    ----------
+    solver : str
+        Name written to files.
+    contraction : Contraction
+        Steps and tolerances (kappa0 l0).
+    warm_sweeps : int
+        Sweeps of an anneal from `warm_temperature` after the contraction; it removes domain walls
+        between orientations without folding.
+    cold_sweeps : int
+        Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
+    """
+
+    solver: str
+    contraction: Contraction
+    warm_sweeps: int = 0
+    cold_sweeps: int = 0
+
+    @property
+    def last(self) -> Contraction:
+        """The final minimisation alone."""
+        return replace(self.contraction, steps=1)
+
+
+WARM_TEMPERATURE = 0.01  # kappa0 l0^2
+WARM_FACTOR = 1e4
+
+ACCURACIES: dict[str, Accuracy] = {
+    # Largest gradient left: 0.03, 0.01, 0.001 kappa0 l0.
+    "draft": Accuracy("relax", Contraction(1, 3e-2, 0, 3e-2, 1500)),
+    "standard": Accuracy("contract", Contraction(20, 3e-2, 100, 1e-2, 6000)),
+    "reference": Accuracy("contract", Contraction(20, 1e-2, 200, 1e-3, 20000), warm_sweeps=2000),
+}
+"""What `accuracy: draft | standard | reference` means."""
+
+
+def annealed(sweeps: int) -> Accuracy:
+    """The paper's anneal of so many sweeps, as it stands: no minimisation follows."""
+    return Accuracy("anneal", Contraction(1, 0.0, 0, 0.0, 1), cold_sweeps=sweeps)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated tissue and how it was reached.
+
+    Parameters
+    ----------
+    sites, positions : ndarray (cells, 3)
+        Cast and final positions, l0.
+    orientation : ndarray (cells, 3)
+        Unit vectors; s and -s are the same cell.
+    tension : ndarray (cells,)
+        Mean over each cell's bonds, kappa0 l0.
+    energy, wall_energy : float
+        Of the bonds and of the walls, kappa0 l0^2.
+    gradient : float
+        Largest component of the gradient left, kappa0 l0.
+    converged : bool
+        Whether the gradient fell below the tolerance; never true for a bare anneal.
+    folded_fraction : float
+        Share of bonds whose direction reversed.
+    gradient_evaluations, sweeps : int
+        Work done.
+    wall_time : float
+        Seconds.
+    """
+
+    sites: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    orientation: NDArray[np.float64]
+    tension: NDArray[np.float64]
+    energy: float
+    wall_energy: float
+    gradient: float
+    converged: bool
+    folded_fraction: float
+    gradient_evaluations: int
+    sweeps: int
+    wall_time: float
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.sites)
+
+
+def simulate(
+    mould: Mould,
+    parameters: CellParameters,
+    model: NetworkModel,
+    accuracy: str | Accuracy = "standard",
+    seed: int = 0,
+) -> Simulation:
+    """Cast a mould, let it contract, and return the tissue.
+
+    The result hangs on the arguments alone; the seed sets the first orientations and every
+    trial move.
+
+    Raises
+    ------
+    RaptorError
+        Where the mould holds no cell or the accuracy has no such name.
+    """
+    if isinstance(accuracy, str):
+        if accuracy not in ACCURACIES:
+            raise RaptorError(
+                f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}"
+            )
+        accuracy = ACCURACIES[accuracy]
+    started = time.perf_counter()
+    rng = np.random.default_rng(seed)
+    lattice = build_lattice(mould, parameters, model)
+    network = build_network(lattice)
+    walls = build_walls(mould, model.height)
+    state = cast_state(lattice, rng)
+    minimum, sweeps = _solve(state, network, walls, parameters.delta, accuracy, rng)
+    state = minimum.state
+    return Simulation(
+        sites=lattice.sites,
+        positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
+        orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),
+        tension=cell_tension(state, lattice, parameters.delta, model.tension),
+        energy=minimum.energy,
+        wall_energy=minimum.walled,
+        gradient=minimum.gradient,
+        converged=minimum.converged,
+        folded_fraction=folded_fraction(state, lattice),
+        gradient_evaluations=minimum.evaluations,
+        sweeps=sweeps,
+        wall_time=time.perf_counter() - started,
+    )
+
+
+def cast_state(lattice: Lattice, rng: Generator) -> NDArray[np.float64]:
+    """The state (6 * cells,) at casting: cells on their sites, orientations uniform on the sphere."""
+    orientation = rng.normal(size=(3, lattice.cells))
+    orientation /= np.linalg.norm(orientation, axis=0)
+    return np.concatenate([lattice.sites.T.ravel(), orientation.ravel()])
+
+
+def _solve(
+    state: NDArray[np.float64],
+    network: Network,
+    walls: Walls,
+    delta: float,
+    accuracy: Accuracy,
+    rng: Generator,
+) -> tuple[Minimum, int]:
+    """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
+    if accuracy.cold_sweeps:
+        state = anneal(state, network, walls, delta, rng, sweeps=accuracy.cold_sweeps).state
+    minimum = contract(state, network, walls, delta, accuracy.contraction)
+    if accuracy.warm_sweeps:
+        warm = anneal(
+            minimum.state,
+            network,
+            walls,
+            delta,
+            rng,
+            sweeps=accuracy.warm_sweeps,
+            initial_temperature=WARM_TEMPERATURE,
+            temperature_factor=WARM_FACTOR,
+        )
+        last = contract(warm.state, network, walls, delta, accuracy.last)
+        evaluations = minimum.evaluations + last.evaluations
+        # A warm anneal that ended higher is not kept.
+        if last.energy + last.walled <= minimum.energy + minimum.walled:
+            minimum = last
+        minimum = minimum._replace(evaluations=evaluations)
+    return minimum, accuracy.cold_sweeps + accuracy.warm_sweeps

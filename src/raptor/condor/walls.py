@@ -1,0 +1,89 @@
+"""Walls: the mould's outline, its tethers, its floor and the fill height push cells back.
+
+The paper's "large penalty" is a stiff spring: stiffness / 2 * depth^2 for a cell that lies `depth`
+inside a wall. The depth in the plane is tabulated once a mould and read through a quadratic
+B-spline: its gradient is continuous, straight walls are exact, corners are rounded over a few
+tenths of l0, and the cost does not grow with the number of tethers.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.compiled import kernel
+from raptor.moulds.geometry import Mould
+
+SPACING = 0.25  # of the table, l0
+RIM = 2.0  # how far the table reaches beyond the outline, l0
+STIFFNESS = 100.0  # kappa0; a few times the stiffness that all of a cell's bonds have together
+
+
+class Walls(NamedTuple):
+    """A table of depths (rows in y, columns in x), its origin, and the vertical bounds, l0."""
+
+    depth: NDArray[np.float64]
+    x0: float
+    y0: float
+    height: float
+    stiffness: float
+
+
+def build_walls(mould: Mould, height: float, stiffness: float = STIFFNESS) -> Walls:
+    """Tabulate how deep each point of the plane lies in a wall of the mould."""
+    x0, y0, x1, y1 = mould.outline.bounds
+    x = np.arange(x0 - RIM, x1 + RIM + 2 * SPACING, SPACING)
+    y = np.arange(y0 - RIM, y1 + RIM + 2 * SPACING, SPACING)
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    depth = mould.forbidden_depth(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+    return Walls(depth, float(x[0]), float(y[0]), float(height), float(stiffness))
+
+
+@kernel
+def _depth_kernel(x, y, walls):  # type: ignore[no-untyped-def]
+    """Depth in a wall at (x, y), and its gradient, by a quadratic B-spline over 3 x 3 knots."""
+    rows, columns = walls.depth.shape
+    u = (x - walls.x0) / SPACING
+    v = (y - walls.y0) / SPACING
+    column = min(max(int(np.floor(u + 0.5)), 1), columns - 2)
+    row = min(max(int(np.floor(v + 0.5)), 1), rows - 2)
+    u -= column
+    v -= row
+    # Weights of the knots -1, 0, 1 at offset u in [-1/2, 1/2], and their derivatives.
+    au, bu, cu = 0.5 * (0.5 - u) ** 2, 0.75 - u * u, 0.5 * (0.5 + u) ** 2
+    dau, dbu, dcu = u - 0.5, -2.0 * u, u + 0.5
+    av, bv, cv = 0.5 * (0.5 - v) ** 2, 0.75 - v * v, 0.5 * (0.5 + v) ** 2
+    dav, dbv, dcv = v - 0.5, -2.0 * v, v + 0.5
+    d = walls.depth
+    low = au * d[row - 1, column - 1] + bu * d[row - 1, column] + cu * d[row - 1, column + 1]
+    mid = au * d[row, column - 1] + bu * d[row, column] + cu * d[row, column + 1]
+    top = au * d[row + 1, column - 1] + bu * d[row + 1, column] + cu * d[row + 1, column + 1]
+    dlow = dau * d[row - 1, column - 1] + dbu * d[row - 1, column] + dcu * d[row - 1, column + 1]
+    dmid = dau * d[row, column - 1] + dbu * d[row, column] + dcu * d[row, column + 1]
+    dtop = dau * d[row + 1, column - 1] + dbu * d[row + 1, column] + dcu * d[row + 1, column + 1]
+    depth = av * low + bv * mid + cv * top
+    gradient_x = (av * dlow + bv * dmid + cv * dtop) / SPACING
+    gradient_y = (dav * low + dbv * mid + dcv * top) / SPACING
+    return depth, gradient_x, gradient_y
+
+
+@kernel
+def _far_kernel(x, y, walls):  # type: ignore[no-untyped-def]
+    """Whether (x, y) is clearly away from walls: depth changes by at most 1 a length."""
+    rows, columns = walls.depth.shape
+    column = int((x - walls.x0) / SPACING)
+    row = int((y - walls.y0) / SPACING)
+    inside = 0 <= column < columns and 0 <= row < rows
+    return inside and walls.depth[row, column] < -3 * SPACING
+
+
+@kernel
+def wall_energy(x, y, z, walls):  # type: ignore[no-untyped-def]
+    """Wall energy of one cell (kappa0 l0^2), and its gradient along x, y and z (kappa0 l0)."""
+    depth, along_x, along_y = -1.0, 0.0, 0.0
+    if not _far_kernel(x, y, walls):
+        depth, along_x, along_y = _depth_kernel(x, y, walls)
+    below = max(0.0, -z) - max(0.0, z - walls.height)
+    push = walls.stiffness * max(0.0, depth)
+    energy = 0.5 * (push * max(0.0, depth) + walls.stiffness * below * below)
+    return energy, push * along_x, push * along_y, -walls.stiffness * below

@@ -1,0 +1,245 @@
+"""`raptor check`: the rules that every file of a data set must satisfy (docs/data.md).
+
+Each check yields faults, one sentence each; a data set without faults yields none.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from raptor.condor.energy import cell_tension, objective
+from raptor.condor.network import build_network
+from raptor.condor.walls import Walls
+from raptor.dataset.design import Run, read_design
+from raptor.dataset.examples import mould_images, read_examples, training_scaling
+from raptor.dataset.netcdf import open_file
+from raptor.dataset.scaling import read_scaling
+from raptor.dataset.shards import Record, Shard, read_shard
+from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
+from raptor.errors import RaptorError
+from raptor.fields import SIGMA
+from raptor.moulds.geojson import read_moulds
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image, pixel_size
+from raptor.symmetry import FIELDS
+
+RELATIVE = 1e-4  # of recomputed values: storage is float32
+DEEP = 5 * SIGMA  # l0; no density lies deeper in a wall
+WALL_YIELD = 0.1  # l0; how far a soft wall gives way
+FREE = Walls(np.full((3, 3), -1e6), 0.0, 0.0, 1e9, 0.0)  # no walls: the energy of bonds alone
+
+
+def check(path: Path) -> list[str]:
+    """Check a results folder, a shard, a field stack, or a prediction.
+
+    Returns
+    -------
+    list of str
+        One sentence a fault; empty where all is well.
+
+    Raises
+    ------
+    RaptorError
+        Where there is nothing at the path that can be checked.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return list(_check_folder(path))
+    with open_file(path) as file:
+        names = set(file.variables)
+    if "row_size" in names:
+        return list(check_shard(path))
+    if "fields" in names:
+        return list(check_stack(path))
+    raise RaptorError(f"{path} is neither a shard nor a field stack; nothing to check")
+
+
+def _check_folder(folder: Path) -> Iterator[str]:
+    stack = folder / "dataset" / "fields.nc"
+    if not stack.is_file():
+        raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder or a file")
+    runs = read_design(folder / "design" / "design.csv")
+    moulds = {mould.name: mould for mould in read_moulds(folder / "design" / "moulds.geojson")}
+    yield from check_design(runs, moulds)
+    with open_file(stack) as file:
+        names = str(getattr(file, "shards", "")).split()
+    shards = [folder / "simulations" / name for name in names]
+    yield from check_stack(stack)
+    yield from check_against_shards(stack, shards, runs, moulds)
+    yield from check_examples(folder / "dataset", stack)
+
+
+def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
+    """Ids and seeds are unique, every mould is found and used once."""
+    for what, values in (
+        ("simulation id", [run.simulation for run in runs]),
+        ("seed", [run.seed for run in runs]),
+        ("mould", [run.mould for run in runs]),
+    ):
+        if len(set(values)) < len(values):
+            twice = next(v for v in values if values.count(v) > 1)
+            splits = sorted({run.split for run, v in zip(runs, values, strict=True) if v == twice})
+            yield f"design.csv: {what} {twice} stands in two rows (splits: {', '.join(splits)})"
+    for run in runs:
+        if run.mould not in moulds:
+            yield f"design.csv: mould {run.mould} of simulation {run.simulation} is not in moulds.geojson"
+
+
+def check_shard(path: Path) -> Iterator[str]:
+    """Energy and tension recomputed from positions and orientations are the stored ones."""
+    try:
+        shard = read_shard(path)
+    except RaptorError as error:
+        yield str(error)
+        return
+    for record in shard.records:
+        yield from _check_record(record, shard, Path(path).name)
+
+
+def _check_record(record: Record, shard: Shard, file: str) -> Iterator[str]:
+    where = f"{file}: simulation {record.simulation}"
+    arrays = ("sites", "positions", "orientation", "tension")
+    broken = [name for name in arrays if not np.isfinite(getattr(record, name)).all()]
+    if broken or not np.isfinite(record.energy):
+        yield f"{where}: NaN or infinity in {', '.join(broken) or 'energy'}"
+        return
+    if np.abs(np.linalg.norm(record.orientation, axis=1) - 1).max() > RELATIVE:
+        yield f"{where}: an orientation is not a unit vector"
+        return
+    lattice = record.lattice(shard.model)
+    delta = record.parameters.delta
+    energy = objective(record.state, build_network(lattice), FREE, delta)[0]
+    if abs(energy - record.energy) > RELATIVE * abs(energy) + 1e-9 * lattice.bonds:
+        yield f"{where}: energy is {record.energy:.6g}, recomputed {energy:.6g}"
+    tension = cell_tension(record.state, lattice, delta, shard.model.tension)
+    worst = np.abs(tension - record.tension).max()
+    if worst > RELATIVE * np.abs(tension).max() + 1e-5:
+        yield f"{where}: tension differs from the recomputed by up to {worst:.3g}"
+
+
+def check_stack(path: Path) -> Iterator[str]:
+    """Invariants of fields and masks; no mould, in any of its eight images, in two splits."""
+    with open_file(path) as file:
+        yield from _check_names(file, Path(path).name)
+    table = read_table(path)
+    first_seen: dict[bytes, Sample] = {}
+    for sample in read_samples(path, range(len(table.split))):
+        where = f"{Path(path).name}: simulation {sample.simulation}"
+        yield from _check_fields(sample, where)
+        for image in mould_images(sample):
+            other = first_seen.setdefault(image, sample)
+            if other.split != sample.split:
+                yield (
+                    f"{where} ({sample.split}) has the mould of simulation {other.simulation} "
+                    f"({other.split}), as it is or turned or mirrored: one mould in two splits"
+                )
+                break
+
+
+def _check_names(file: object, name: str) -> Iterator[str]:
+    variables = getattr(file, "variables")  # noqa: B009  netCDF4 has no types
+    if [str(v) for v in variables["field"][:]] != list(FIELDS):
+        yield f"{name}: the fields are not {', '.join(FIELDS)} in this order"
+    for variable in variables.values():
+        if not (hasattr(variable, "long_name") and hasattr(variable, "units")):
+            yield f"{name}: variable {variable.name} lacks long_name or units"
+
+
+def _check_fields(sample: Sample, where: str) -> Iterator[str]:
+    fields = {name: field.astype(np.float64) for name, field in zip(FIELDS, sample.fields, strict=True)}
+    for name, field in fields.items():
+        if not np.isfinite(field).all():
+            yield f"{where}: NaN or infinity in {name}"
+            return
+    density = fields["density"]
+    small = 1e-5 * density.max() + 1e-12
+    trace = fields["sxsx"] + fields["sysy"] + fields["szsz"]
+    if np.abs(trace - density).max() > small:
+        yield f"{where}: sxsx + sysy + szsz is not density (off by {np.abs(trace - density).max():.3g})"
+    if abs(density.sum() / sample.n_cells - 1) > 1e-3:
+        yield f"{where}: density sums to {density.sum():.6g}, the tissue has {sample.n_cells} cells"
+    if density.min() < 0:
+        yield f"{where}: density is negative ({density.min():.3g})"
+    for a, b in (("x", "y"), ("x", "z"), ("y", "z")):
+        product = fields[f"s{a}s{a}"] * fields[f"s{b}s{b}"]
+        if (np.abs(fields[f"s{a}s{b}"]) > np.sqrt(np.maximum(product, 0)) + small).any():
+            yield f"{where}: |s{a}s{b}| exceeds sqrt(s{a}s{a} s{b}s{b}): orientation tensor not positive"
+    if (sample.depression & sample.tethers).any():
+        yield f"{where}: depression and tethers overlap"
+    away = distance_transform_edt(sample.depression == 0) * pixel_size(density.shape[-1])
+    deep = away > DEEP + WALL_YIELD + pixel_size(density.shape[-1])
+    if (density[deep] > small).any():
+        yield f"{where}: density of {density[deep].max():.3g} deep in a tether or outside the depression"
+
+
+def check_against_shards(
+    stack: Path, shards: list[Path], runs: list[Run], moulds: dict[str, Mould]
+) -> Iterator[str]:
+    """Fields, masks and parameters of a stack are those of the simulations it was made from."""
+    table = read_table(stack)
+    rows = {int(simulation): row for row, simulation in enumerate(table.simulation)}
+    by_id = {run.simulation: run for run in runs}
+    for missing in sorted(set(by_id) ^ set(rows)):
+        yield f"simulation {missing} is in only one of design.csv and {Path(stack).name}"
+    for path in shards:
+        try:
+            shard = read_shard(path)
+        except RaptorError as error:
+            yield str(error)
+            continue
+        for record in shard.records:
+            yield from _check_record(record, shard, path.name)
+            run = by_id.get(record.simulation)
+            if record.simulation not in rows or run is None or run.mould not in moulds:
+                yield f"{path.name}: simulation {record.simulation} or its mould is not in the design"
+                continue
+            (sample,) = read_samples(stack, [rows[record.simulation]])
+            yield from _compare(sample, record, run, moulds[run.mould])
+
+
+def _compare(sample: Sample, record: Record, run: Run, mould: Mould) -> Iterator[str]:
+    where = f"simulation {sample.simulation}"
+    stored = (sample.mould, sample.split, sample.n_cells, sample.parameters)
+    if stored != (run.mould, run.split, len(record.positions), run.parameters) or (
+        record.parameters != run.parameters or record.seed != run.seed
+    ):
+        yield f"{where}: mould, split, cells, seed or parameters differ between design, shard and stack"
+    image = mould_image(mould, sample.fields.shape[-1])
+    if (image.depression != sample.depression).any() or (image.tethers != sample.tethers).any():
+        yield f"{where}: its masks are not those of mould {run.mould}"
+    fields = record_fields(record, sample.fields.shape[-1])
+    for name, stored_field, field in zip(FIELDS, sample.fields, fields, strict=True):
+        if np.abs(stored_field - field).max() <= RELATIVE * np.abs(field).max():
+            continue
+        if np.abs(stored_field + field).max() <= RELATIVE * np.abs(field).max():
+            yield f"{where}: {name} has the opposite sign of the field recomputed from the shard"
+        else:
+            yield f"{where}: {name} differs from the field recomputed from the shard"
+
+
+def check_examples(folder: Path, stack: Path) -> Iterator[str]:
+    """Examples exist, are listed once, and come from no test sample; scaling is the training split's."""
+    table = read_table(stack)
+    try:
+        examples = read_examples(folder / "examples.csv")
+        scaling = read_scaling(folder / "normalisation.json")
+    except RaptorError as error:
+        yield str(error)
+        return
+    if len(set(examples)) < len(examples):
+        yield "examples.csv: an example is listed twice"
+    for example in examples:
+        if not (0 <= example.sample < len(table.split) and 0 <= example.element < 8):
+            yield f"examples.csv: {example} is not in {Path(stack).name}"
+        elif table.split[example.sample] == "test":
+            yield f"examples.csv: sample {example.sample} is held out for test"
+    wanted = training_scaling(stack)
+    if not np.allclose(_flat(scaling), _flat(wanted), rtol=1e-6, equal_nan=True):
+        yield "normalisation.json: the constants are not those of the training split"
+
+
+def _flat(scaling: object) -> NDArray[np.float64]:
+    return np.concatenate([getattr(scaling, "offset"), getattr(scaling, "scale")])  # noqa: B009

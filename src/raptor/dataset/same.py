@@ -1,0 +1,62 @@
+"""Whether two data sets are the same data (docs/data.md, rule 6)."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raptor.dataset.netcdf import open_file
+
+TABLES = ("design/design.csv", "design/moulds.geojson", "dataset/examples.csv", "dataset/normalisation.json")
+
+
+def differences(first: Path, second: Path) -> list[str]:
+    """What differs between two results folders, one sentence each; empty for the same data.
+
+    Ordered by simulation id, every variable but wall_time must be bit-equal, and every table
+    equal. Histories and times may differ.
+    """
+    found = [f"{name} differs" for name in TABLES if _table(first / name) != _table(second / name)]
+    one, two = (_simulations(Path(folder)) for folder in (first, second))
+    if one.keys() != two.keys():
+        found.append(f"simulations {sorted(one.keys() ^ two.keys())} are in only one of the folders")
+    for simulation in sorted(one.keys() & two.keys()):
+        names = [n for n in one[simulation] if not _equal(one[simulation][n], two[simulation].get(n))]
+        if names:
+            found.append(f"simulation {simulation}: {', '.join(names)} differ")
+    stacks = [Path(folder) / "dataset" / "fields.nc" for folder in (first, second)]
+    with open_file(stacks[0]) as a, open_file(stacks[1]) as b:
+        found += [f"fields.nc: {n} differs" for n in a.variables if not _equal(a[n][:], b[n][:])]
+    return found
+
+
+def _simulations(folder: Path) -> dict[int, dict[str, Any]]:
+    """Every variable of every simulation of a folder, but its wall time."""
+    with open_file(folder / "dataset" / "fields.nc") as stack:
+        shards = str(stack.shards).split()
+    found: dict[int, dict[str, Any]] = {}
+    for shard in shards:
+        with open_file(folder / "simulations" / shard) as file:
+            ends = np.cumsum(file["row_size"][:])
+            for row, end in enumerate(ends):
+                cells = slice(end - file["row_size"][row], end)
+                found[int(file["simulation"][row])] = {
+                    name: variable[cells if variable.dimensions == ("cell",) else row]
+                    for name, variable in file.variables.items()
+                    if name != "wall_time"
+                }
+    return found
+
+
+def _equal(a: Any, b: Any) -> bool:
+    a, b = np.asarray(a), np.asarray(b)
+    return bool(a.shape == b.shape and np.array_equal(a, b, equal_nan=a.dtype.kind == "f"))
+
+
+def _table(path: Path) -> Any:
+    if path.suffix in (".json", ".geojson"):
+        return json.loads(path.read_text())
+    with path.open(newline="") as file:
+        return list(csv.reader(file))

@@ -1,0 +1,106 @@
+"""Scaling of fields to [-1, 1] by constants of the training split alone, and back.
+
+The constants commute with D4: sxsx and sysy share theirs, and so do sxsz and sysz; what can change
+sign is scaled symmetrically about zero.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.errors import RaptorError
+from raptor.files import atomic_path
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.symmetry import FIELDS
+
+SHARED = (("sxsx", "sysy"), ("sxsz", "sysz"))
+SIGNED = ("tension", "sxsy", "sxsz", "sysz")
+INPUTS = ("depression", "tethers", "delta", "kappa_nnn", "kappa_nnnn")
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """scaled = (value - offset) / scale, and value = scaled * scale + offset, a field."""
+
+    offset: tuple[float, ...]
+    scale: tuple[float, ...]
+
+    def forward(self, fields: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Physical fields (..., 8, y, x) to [-1, 1]."""
+        offset, scale = self._constants()
+        return ((fields - offset) / scale).astype(np.float32)
+
+    def inverse(self, scaled: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Scaled fields (..., 8, y, x) back to physical units."""
+        offset, scale = self._constants()
+        return (scaled * scale + offset).astype(np.float32)
+
+    def _constants(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return np.array(self.offset)[:, None, None], np.array(self.scale)[:, None, None]
+
+    def as_json(self) -> dict[str, Any]:
+        """As it stands in `normalisation.json` and beside weights."""
+        return {"fields": list(FIELDS), **asdict(self)}
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any]) -> "Scaling":
+        """Read back what `as_json` gave."""
+        return cls(tuple(content["offset"]), tuple(content["scale"]))
+
+
+def fit_scaling(low: NDArray[np.floating], high: NDArray[np.floating]) -> Scaling:
+    """Scaling from the extremes (8,) of each field over the training split."""
+    low, high = low.astype(np.float64), high.astype(np.float64)
+    for group in SHARED:
+        members = [FIELDS.index(name) for name in group]
+        low[members], high[members] = low[members].min(), high[members].max()
+    for name in SIGNED:
+        member = FIELDS.index(name)
+        high[member] = max(abs(low[member]), abs(high[member]))
+        low[member] = -high[member]
+    scale = np.maximum((high - low) / 2, 1e-12)
+    return Scaling(tuple(float(v) for v in (high + low) / 2), tuple(float(v) for v in scale))
+
+
+def scale_inputs(
+    depression: NDArray[Any], tethers: NDArray[Any], parameters: CellParameters
+) -> NDArray[np.float32]:
+    """The five input channels (5, y, x) in [-1, 1]: two masks, then the parameters as constants."""
+    channels = np.empty((len(INPUTS), *depression.shape), dtype=np.float32)
+    channels[0] = 2.0 * depression - 1.0
+    channels[1] = 2.0 * tethers - 1.0
+    for row, (name, bounds) in enumerate(
+        (("delta", DELTA), ("kappa_nnn", KAPPA_NNN), ("kappa_nnnn", KAPPA_NNNN)), start=2
+    ):
+        middle, half = (bounds.upper + bounds.lower) / 2, (bounds.upper - bounds.lower) / 2
+        channels[row] = (getattr(parameters, name) - middle) / half
+    return channels
+
+
+def write_scaling(path: Path, scaling: Scaling) -> None:
+    """Write the constants, with the formula and its inverse in words."""
+    content = scaling.as_json() | {
+        "formula": "scaled = (value - offset) / scale",
+        "inverse": "value = scaled * scale + offset",
+        "from": "the training split alone",
+    }
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def read_scaling(path: Path) -> Scaling:
+    """Read the constants.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is missing or incomplete.
+    """
+    try:
+        return Scaling.from_json(json.loads(Path(path).read_text()))
+    except (OSError, ValueError, KeyError) as error:
+        raise RaptorError(f"normalisation {path} cannot be read: {error}") from error

@@ -1,0 +1,201 @@
+"""Shards: simulations as files, CF contiguous ragged arrays of cells."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor import MODEL_VERSION
+from raptor.condor.accuracy import ACCURACIES, Simulation, simulate
+from raptor.condor.lattice import Lattice, connect
+from raptor.dataset.design import Run
+from raptor.dataset.netcdf import create, open_file, variable
+from raptor.errors import RaptorError
+from raptor.moulds.geometry import Mould
+from raptor.parameters import CellParameters, NetworkModel
+
+PARAMETERS = {
+    "delta": "strength of the cell-matrix interaction",
+    "kappa_nnn": "spring constant of the second kind of bond, in kappa0",
+    "kappa_nnnn": "spring constant of the third kind of bond, in kappa0",
+}
+RESULTS = {
+    "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
+    "wall_energy": "energy of the walls, in kappa0 l0^2",
+    "gradient": "largest component of the energy's gradient left, in kappa0 l0",
+    "converged": "1 where the gradient fell below the solver's tolerance",
+    "folded_fraction": "share of bonds whose direction reversed since casting",
+    "gradient_evaluations": "evaluations of energy and gradient",
+    "sweeps": "sweeps of annealing",
+}
+CELL_VARIABLES = {
+    "x0": "cast position x, in l0", "y0": "cast position y, in l0", "z0": "cast position z, in l0",
+    "x": "position x, in l0", "y": "position y, in l0", "z": "position z, in l0",
+    "sx": "orientation x", "sy": "orientation y", "sz": "orientation z",
+    "tension": "mean tension of the cell's bonds, in kappa0 l0",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Record:
+    """One simulation as read back from a shard; arrays as in `Simulation`."""
+
+    simulation: int
+    parameters: CellParameters
+    seed: int
+    energy: float
+    converged: bool
+    folded_fraction: float
+    wall_time: float
+    sites: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    orientation: NDArray[np.float64]
+    tension: NDArray[np.float64]
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """Positions and orientations as one array (6 * cells,), as the energy takes them."""
+        return np.concatenate([self.positions.T.ravel(), self.orientation.T.ravel()])
+
+    def lattice(self, model: NetworkModel) -> Lattice:
+        """The bonds, built again from the cast positions."""
+        return connect(self.sites, self.parameters, model)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """The simulations of one file and the model that made them."""
+
+    records: list[Record]
+    model: NetworkModel
+    accuracy: str
+    configuration: str
+
+
+def simulate_shard(
+    runs: list[Run],
+    moulds: dict[str, Mould],
+    model: NetworkModel,
+    accuracy: str,
+    done: Callable[[Run, Simulation], None] = lambda run, simulation: None,
+) -> list[Simulation]:
+    """Simulate runs one after another; `done` is told of each."""
+    simulations = []
+    for run in runs:
+        simulation = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
+        done(run, simulation)
+        simulations.append(simulation)
+    return simulations
+
+
+def write_shard(
+    path: Path,
+    runs: list[Run],
+    simulations: list[Simulation],
+    model: NetworkModel,
+    accuracy: str,
+    configuration: str,
+) -> None:
+    """Write simulations as one shard, whole or not at all."""
+    with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
+        file.featureType = "point"
+        file.shells = np.array(model.shells, dtype=np.int32)
+        file.layers = np.int32(model.layers)
+        file.tension = model.tension
+        file.accuracy = accuracy
+        file.solver = ACCURACIES[accuracy].solver
+        file.createDimension("simulation", len(runs))
+        file.createDimension("cell", sum(s.cells for s in simulations))
+        _write_simulations(file, runs, simulations)
+        columns = np.concatenate([_columns(s) for s in simulations]).astype(np.float32)
+        for (name, long_name), column in zip(CELL_VARIABLES.items(), columns.T, strict=True):
+            variable(file, name, ("cell",), column, long_name)
+
+
+def _write_simulations(
+    file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]
+) -> None:
+    along = ("simulation",)
+    ids = np.array([run.simulation for run in runs], dtype=np.int32)
+    variable(file, "simulation", along, ids, "simulation id")
+    seeds = np.array([run.seed for run in runs], dtype=np.int64)
+    variable(file, "seed", along, seeds, "seed of the simulation's random stream")
+    sizes = np.array([s.cells for s in simulations], dtype=np.int32)
+    variable(file, "row_size", along, sizes, "number of cells").sample_dimension = "cell"
+    for name, long_name in PARAMETERS.items():
+        values = np.array([getattr(run.parameters, name) for run in runs])
+        variable(file, name, along, values, long_name)
+    for name, long_name in RESULTS.items():
+        values = np.array([getattr(s, name) for s in simulations])
+        if values.dtype.kind in "bi":
+            values = values.astype(np.int8 if name == "converged" else np.int32)
+        variable(file, name, along, values, long_name)
+    times = np.array([s.wall_time for s in simulations])
+    variable(file, "wall_time", along, times, "wall time of the simulation", "s")
+
+
+def _columns(simulation: Simulation) -> NDArray[np.float64]:
+    """The cells' variables (cells, 10), in the order of `CELL_VARIABLES`."""
+    return np.column_stack(
+        [simulation.sites, simulation.positions, simulation.orientation, simulation.tension]
+    )
+
+
+def read_shard(path: Path, configuration: str | None = None) -> Shard:
+    """Read a shard; with `configuration`, only one of that configuration.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is missing, cut short, incomplete, or of another configuration or model.
+    """
+    with open_file(path) as file:
+        if configuration is not None and (
+            getattr(file, "configuration", None) != configuration
+            or getattr(file, "model_version", None) != MODEL_VERSION
+        ):
+            raise RaptorError(
+                f"shard {path} was made by another configuration or model version; delete it and "
+                "run the workflow again"
+            )
+        try:
+            model = NetworkModel(
+                int(file.layers), tuple(int(s) for s in np.atleast_1d(file.shells)), str(file.tension)
+            )
+            return Shard(_read_records(file), model, str(file.accuracy), str(file.configuration))
+        except (AttributeError, KeyError, IndexError, RuntimeError) as error:
+            raise RaptorError(
+                f"shard {path} is incomplete ({error}); delete it and run the workflow again"
+            ) from error
+
+
+def _read_records(file: netCDF4.Dataset) -> list[Record]:
+    cells = np.column_stack([file[name][:] for name in CELL_VARIABLES]).astype(np.float64)
+    sizes = file["row_size"][:]
+    if sizes.sum() != len(cells):
+        raise IndexError(f"row_size counts {sizes.sum()} cells, the file holds {len(cells)}")
+    values = {
+        name: file[name][:]
+        for name in ("simulation", "seed", *PARAMETERS, *RESULTS, "wall_time")
+    }
+    records = []
+    for row, block in enumerate(np.split(cells, np.cumsum(sizes)[:-1])):
+        records.append(
+            Record(
+                simulation=int(values["simulation"][row]),
+                parameters=CellParameters(*(float(values[name][row]) for name in PARAMETERS)),
+                seed=int(values["seed"][row]),
+                energy=float(values["energy"][row]),
+                converged=bool(values["converged"][row]),
+                folded_fraction=float(values["folded_fraction"][row]),
+                wall_time=float(values["wall_time"][row]),
+                sites=block[:, 0:3],
+                positions=block[:, 3:6],
+                orientation=block[:, 6:9],
+                tension=block[:, 9],
+            )
+        )
+    return records

@@ -1,0 +1,194 @@
+"""The field stack: every simulation as eight images beside its mould, in physical units."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.dataset.design import Run
+from raptor.dataset.netcdf import create, open_file, variable
+from raptor.dataset.shards import PARAMETERS, Record, read_shard
+from raptor.errors import RaptorError
+from raptor.fields import rasterise
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image, pixel_centres
+from raptor.parameters import CellParameters
+from raptor.symmetry import FIELDS
+
+LONG_NAMES = {
+    "density": "cells per pixel",
+    "tension": "sum over cells of their mean bond tension, in kappa0 l0 per pixel",
+    "sxsx": "sum over cells of sx sx, per pixel", "sysy": "sum over cells of sy sy, per pixel",
+    "szsz": "sum over cells of sz sz, per pixel", "sxsy": "sum over cells of sx sy, per pixel",
+    "sxsz": "sum over cells of sx sz, per pixel", "sysz": "sum over cells of sy sz, per pixel",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sample of a stack: fields (8, y, x), masks (y, x), and where it comes from."""
+
+    fields: NDArray[np.float32]
+    depression: NDArray[np.uint8]
+    tethers: NDArray[np.uint8]
+    parameters: CellParameters
+    simulation: int
+    mould: str
+    split: str
+    n_cells: int
+
+
+def record_fields(record: Record, pixels: int) -> NDArray[np.float64]:
+    """The eight fields (8, pixels, pixels) of a simulation read from a shard."""
+    return rasterise(record.positions, record.orientation, record.tension, pixels)
+
+
+def build_stack(
+    path: Path,
+    shards: Iterable[Path],
+    runs: Sequence[Run],
+    moulds: dict[str, Mould],
+    pixels: int,
+    *,
+    simulation_configuration: str,
+    configuration: str,
+    done: Callable[[int], None] = lambda sample: None,
+) -> None:
+    """Rasterise every simulation of the shards into one file, sample by sample.
+
+    Raises
+    ------
+    RaptorError
+        Where a shard is missing, cut short or of another configuration, or a simulation of the
+        design is in none of them.
+    """
+    by_id = {run.simulation: run for run in runs}
+    order = {simulation: row for row, simulation in enumerate(sorted(by_id))}
+    left = set(by_id)
+    with create(path, "CONDOR fields of tissues in tethered moulds", configuration) as file:
+        write = create_stack(file, len(runs), pixels)
+        shards = list(shards)
+        file.shards = " ".join(Path(shard).name for shard in shards)
+        for shard_path in shards:
+            for record in read_shard(shard_path, simulation_configuration).records:
+                if record.simulation not in left:
+                    raise RaptorError(
+                        f"shard {shard_path} holds simulation {record.simulation}, which the design "
+                        "does not have or another shard has too; delete it and run the workflow again"
+                    )
+                left.remove(record.simulation)
+                run = by_id[record.simulation]
+                row = order[record.simulation]
+                image = mould_image(moulds[run.mould], pixels)
+                write(
+                    row,
+                    Sample(
+                        record_fields(record, pixels).astype(np.float32),
+                        image.depression.astype(np.uint8),
+                        image.tethers.astype(np.uint8),
+                        run.parameters,
+                        run.simulation,
+                        run.mould,
+                        run.split,
+                        len(record.positions),
+                    ),
+                )
+                done(row)
+        if left:
+            raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
+
+
+def create_stack(
+    file: netCDF4.Dataset, samples: int, pixels: int
+) -> Callable[[int, Sample], None]:
+    """Create a stack's dimensions and variables; returns a function that writes one sample."""
+    for name, size in (("sample", samples), ("field", len(FIELDS)), ("y", pixels), ("x", pixels)):
+        file.createDimension(name, size)
+    variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
+    file["field"].comment = "; ".join(f"{name}: {text}" for name, text in LONG_NAMES.items())
+    for axis in "yx":
+        centres = pixel_centres(pixels)
+        variable(file, axis, (axis,), centres, f"pixel centre {axis}, in l0")
+    along = ("sample",)
+    image, plane = (1, len(FIELDS), pixels, pixels), (1, pixels, pixels)
+    packed: dict[str, Any] = {"compression": "zlib", "complevel": 4, "shuffle": True}
+    columns = {
+        "fields": ("f4", ("sample", "field", "y", "x"), "fields, per pixel", {"chunksizes": image} | packed),
+        "depression": ("u1", ("sample", "y", "x"), "1 where cells may be", {"chunksizes": plane} | packed),
+        "tethers": ("u1", ("sample", "y", "x"), "1 where a tether stands", {"chunksizes": plane} | packed),
+        **{name: ("f8", along, text, {}) for name, text in PARAMETERS.items()},
+        "simulation": ("i4", along, "simulation id", {}),
+        "mould": (str, along, "mould id", {}),
+        "split": (str, along, "train, validation or test", {}),
+        "n_cells": ("i4", along, "number of cells", {}),
+    }  # fmt: skip
+    for name, (kind, dimensions, long_name, options) in columns.items():
+        made = file.createVariable(name, kind, dimensions, **options)
+        made.long_name, made.units = long_name, "1"
+
+    def write(row: int, sample: Sample) -> None:
+        for name in ("fields", "depression", "tethers", "simulation", "mould", "split", "n_cells"):
+            file[name][row] = getattr(sample, name)
+        for name in PARAMETERS:
+            file[name][row] = getattr(sample.parameters, name)
+
+    return write
+
+
+@dataclass(frozen=True)
+class StackTable:
+    """What a stack holds besides its images, one entry a sample."""
+
+    simulation: NDArray[np.int32]
+    mould: list[str]
+    split: list[str]
+    n_cells: NDArray[np.int32]
+    parameters: list[CellParameters]
+    pixels: int
+
+    def rows(self, *splits: str) -> list[int]:
+        """Samples of some splits, in order."""
+        return [row for row, split in enumerate(self.split) if split in splits]
+
+
+def read_table(path: Path) -> StackTable:
+    """Read what a stack holds besides its images.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is missing or is no stack.
+    """
+    with open_file(path) as file:
+        try:
+            columns = [file[name][:] for name in PARAMETERS]
+            return StackTable(
+                file["simulation"][:],
+                [str(v) for v in file["mould"][:]],
+                [str(v) for v in file["split"][:]],
+                file["n_cells"][:],
+                [CellParameters(*(float(v) for v in row)) for row in zip(*columns, strict=True)],
+                file.dimensions["x"].size,
+            )
+        except (IndexError, KeyError) as error:
+            raise RaptorError(f"{path} is not a field stack: {error}") from error
+
+
+def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
+    """Read samples one at a time; never more than one in memory."""
+    with open_file(path) as file:
+        for row in rows:
+            yield Sample(
+                file["fields"][row],
+                file["depression"][row],
+                file["tethers"][row],
+                CellParameters(*(float(file[name][row]) for name in PARAMETERS)),
+                int(file["simulation"][row]),
+                str(file["mould"][row]),
+                str(file["split"][row]),
+                int(file["n_cells"][row]),
+            )

@@ -1,0 +1,48 @@
+"""Files are written whole or not at all."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from raptor.errors import RaptorError
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; on success it is flushed to disk and takes its name.
+
+    Two writers of one file are both harmless: each has a temporary file of its own.
+
+    Raises
+    ------
+    RaptorError
+        Where the disk is full or the place cannot be written.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT) or _is_full(path.parent):
+            raise RaptorError(
+                f"no room left on the disk for {path}; free some space and run the same command "
+                "again: what is finished is kept"
+            ) from error
+        raise RaptorError(f"{path} cannot be written: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _is_full(folder: Path) -> bool:
+    """Whether the disk is out of room; libraries such as HDF5 do not say so themselves."""
+    try:
+        status = os.statvfs(folder)
+    except OSError:
+        return False
+    return status.f_bavail * status.f_frsize < 64 * 1024

@@ -1,0 +1,203 @@
+"""Fitting cell and matrix parameters to a tissue (paper, "Parameter fitting").
+
+The residual sum of squares of area ratio and central width ratio is minimised within the paper's
+bounds. Three parameters and two numbers: the minimum is a valley, and the covariance says so.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from raptor.condor.accuracy import Simulation
+from raptor.fields import rasterise
+from raptor.files import atomic_path
+from raptor.morphology import area_ratio, density_threshold, width_ratio
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.parameters import (
+    DELTA,
+    KAPPA_NNN,
+    KAPPA_NNNN,
+    CellParameters,
+    NetworkModel,
+    largest_kappa_nnnn,
+)
+from raptor.surrogate.inference import Surrogate
+
+STEP = 0.02  # of a finite difference, in units of a bound's width: the area counts whole pixels
+BOUND_MARGIN = 1e-9
+
+Measure = Callable[[Sequence[CellParameters]], NDArray[np.float64]]
+"""From parameters to (n, 2): area ratio and central width ratio of each."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What was measured on a tissue; None where it was not."""
+
+    area_ratio: float | None
+    width_ratio: float | None
+
+    def residuals(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Measured (..., 2) less target (..., 1 or 2), for what the target has."""
+        wanted = [self.area_ratio, self.width_ratio]
+        columns = [column for column, value in enumerate(wanted) if value is not None]
+        return np.asarray(measured[..., columns] - np.array([wanted[c] for c in columns], dtype=float))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted tissue.
+
+    Parameters
+    ----------
+    parameters : CellParameters
+        At the least cost found.
+    area_ratio, width_ratio : float
+        Of the model there.
+    rss : float
+        Residual sum of squares.
+    standard_error : tuple of float or None
+        Of delta, kappa_nnn, kappa_nnnn, by the linearised covariance, if the measurements
+        determine all three; None where they do not.
+    rank : int
+        How many combinations of the three parameters the measurements determine.
+    evaluations : int
+        Predictions made.
+    """
+
+    parameters: CellParameters
+    area_ratio: float
+    width_ratio: float
+    rss: float
+    standard_error: tuple[float, ...] | None
+    rank: int
+    evaluations: int
+
+
+def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
+    """The paper's bounded region as a cube: (0..1)^3 to parameters with kappa_nnnn in its bound."""
+    delta, first, second = (float(v) for v in np.clip(unit, 0.0, 1.0))
+    kappa_nnn = KAPPA_NNN.lower + first * (KAPPA_NNN.upper - KAPPA_NNN.lower)
+    top = min(KAPPA_NNNN.upper, largest_kappa_nnnn(kappa_nnn))
+    return CellParameters(
+        DELTA.lower + delta * (DELTA.upper - DELTA.lower),
+        kappa_nnn,
+        KAPPA_NNNN.lower + second * (top - KAPPA_NNNN.lower),
+    )
+
+
+def surrogate_measure(surrogate: Surrogate, mould: Mould) -> Measure:
+    """Area and width ratio of a mould's tissue as the surrogate predicts them."""
+    image = mould_image(mould, surrogate.architecture.pixels)
+    threshold = density_threshold(surrogate.layers, surrogate.architecture.pixels)
+
+    def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
+        densities = surrogate.predict(image.depression, image.tethers, parameters)[:, 0]
+        return np.array(
+            [
+                (area_ratio(density, image, threshold), width_ratio(density, mould, threshold))
+                for density in densities
+            ]
+        )
+
+    return measure
+
+
+def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
+    """Bounded non-linear least squares from the best of many points that fill the region.
+
+    Parameters
+    ----------
+    starts : int
+        Points of a Sobol sequence at which the model is evaluated first (a power of two); the
+        best four are refined.
+    """
+    points = qmc.Sobol(3, seed=seed).random(starts)
+    measured = measure([parameters_at(point) for point in points])
+    costs = (target.residuals(measured) ** 2).sum(axis=-1)
+    costs = np.where(np.isfinite(costs), costs, np.inf)
+    count = starts
+
+    def residuals(unit: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal count
+        count += 1
+        return target.residuals(measure([parameters_at(unit)])[0])
+
+    refined = [
+        least_squares(
+            residuals,
+            points[start],
+            bounds=(-BOUND_MARGIN, 1 + BOUND_MARGIN),
+            diff_step=STEP,
+            x_scale=0.3,
+            max_nfev=30,
+        )
+        for start in np.argsort(costs)[:4]
+    ]
+    best = min(refined, key=lambda result: float(result.cost))
+    parameters = parameters_at(best.x)
+    area, width = (float(v) for v in measure([parameters])[0])
+    rank, errors = _covariance(best.jac, best.x, 2 * float(best.cost))
+    return Fit(parameters, area, width, 2 * float(best.cost), errors, rank, count)
+
+
+def _covariance(
+    jacobian: NDArray[np.float64], unit: NDArray[np.float64], rss: float
+) -> tuple[int, tuple[float, ...] | None]:
+    """Rank of the linearised problem and, where it is full, the parameters' standard errors."""
+    rank = int(np.linalg.matrix_rank(jacobian, tol=1e-6))
+    if rank < 3 or len(jacobian) <= 3:
+        return rank, None
+    covariance = np.linalg.inv(jacobian.T @ jacobian) * rss / (len(jacobian) - 3)
+    base = np.array(list(asdict(parameters_at(unit)).values()))
+    slopes = np.stack(
+        [np.array(list(asdict(parameters_at(unit + STEP * e)).values())) - base for e in np.eye(3)], 1
+    ) / STEP
+    return rank, tuple(float(v) for v in np.sqrt(np.diag(slopes @ covariance @ slopes.T)))
+
+
+def write_fit(path: Path, content: dict[str, Any]) -> None:
+    """Write a fit as JSON."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def measure_simulation(
+    simulation: Simulation, mould: Mould, model: NetworkModel, pixels: int, target: Target
+) -> dict[str, float]:
+    """Area ratio, width ratio and residual sum of squares of a simulated tissue."""
+    density = rasterise(simulation.positions, simulation.orientation, simulation.tension, pixels)[0]
+    threshold = density_threshold(model.layers, pixels)
+    area = area_ratio(density, mould_image(mould, pixels), threshold)
+    width = width_ratio(density, mould, threshold)
+    rss = float((target.residuals(np.array([area, width])) ** 2).sum())
+    return {"area_ratio": area, "width_ratio": width, "rss": rss}
+
+
+def tabulate(fits: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Fits as rows: target, surrogate's fit, its re-simulation, and the paper's, side by side."""
+    rows = []
+    for content in fits:
+        target = Target(**content["target"])
+        paper = content["paper"]
+        row: dict[str, Any] = {"tissue": content["tissue"]}
+        row |= {f"target_{key}": value for key, value in content["target"].items()}
+        row |= content["surrogate"]["parameters"]
+        for source in ("surrogate", "simulation"):
+            row |= {f"{source}_{key}": content[source][key] for key in ("area_ratio", "width_ratio", "rss")}
+        row["determined"] = content["surrogate"]["rank"]
+        if {"area_ratio", "width_ratio"} <= paper.keys():
+            residuals = target.residuals(np.array([paper["area_ratio"], paper["width_ratio"]]))
+            row["paper_simulation_rss"] = float((residuals**2).sum())
+        row |= {f"paper_{key}": value for key, value in paper.items()}
+        rows.append(row)
+    return pd.DataFrame(rows)

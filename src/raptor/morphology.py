@@ -1,0 +1,72 @@
+"""Area and width of a tissue, from its density (paper, "Model parameters and predictive capability")."""
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from raptor.moulds.geometry import IMAGE_SIZE, Mould
+from raptor.moulds.raster import MouldImage, pixel_size
+
+SAMPLES_PER_PIXEL = 4  # along a section
+
+
+def density_threshold(layers: int, pixels: int) -> float:
+    """Density per pixel above which there is tissue: 0.2 at 7 layers and 256 pixels (paper)."""
+    return 0.48 * layers * pixel_size(pixels) ** 2
+
+
+def area_ratio(density: NDArray[np.floating], image: MouldImage, threshold: float) -> float:
+    """A/A0: pixels (y, x) of tissue anywhere in the image, over pixels of the depression."""
+    return float(np.count_nonzero(density > threshold) / np.count_nonzero(image.depression))
+
+
+def central_section(mould: Mould) -> shapely.LineString:
+    """The line across the centre of the depression's minimum rotated rectangle, along its short side.
+
+    Where the two sides are equal, the one nearer to x counts as the long one.
+    """
+    rectangle = shapely.oriented_envelope(mould.outline)
+    corners = shapely.get_coordinates(rectangle)[:4]
+    centre = corners.mean(axis=0)
+    sides = corners[1:3] - corners[:2]
+    lengths = np.linalg.norm(sides, axis=1)
+    if np.isclose(lengths[0], lengths[1], rtol=1e-6):
+        long = int(np.abs(sides[1, 0]) > np.abs(sides[0, 0]))
+    else:
+        long = int(lengths[1] > lengths[0])
+    across = np.array([-sides[long, 1], sides[long, 0]]) / lengths[long]
+    reach = IMAGE_SIZE * across
+    return shapely.LineString([centre - reach, centre + reach])
+
+
+def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -> float:
+    """w/w0: length of tissue on the central section over length of depression; NaN without any.
+
+    The ends of the tissue are found by linear interpolation of the density between samples.
+    """
+    section = central_section(mould)
+    cast = float(section.intersection(mould.depression).length)
+    if cast < 1e-9:
+        return float("nan")
+    pixels = density.shape[-1]
+    step = pixel_size(pixels) / SAMPLES_PER_PIXEL
+    # The centre is a sample, so that a mould and its mirror image are sampled alike.
+    count = int(section.length / 2 / step)
+    along = np.arange(-count, count + 1) * step
+    (x0, y0), (x1, y1) = section.coords
+    x = (x0 + x1) / 2 + along * (x1 - x0) / section.length
+    y = (y0 + y1) / 2 + along * (y1 - y0) / section.length
+    middle = (pixels - 1) / 2
+    rows, columns = (middle + c / pixel_size(pixels) for c in (y, x))
+    values = map_coordinates(density, [rows, columns], order=1, mode="constant", cval=0.0)
+    return float(_length_above(values - threshold) * step / cast)
+
+
+def _length_above(excess: NDArray[np.floating]) -> float:
+    """Length, in samples, over which a piecewise linear function is positive."""
+    left, right = excess[:-1], excess[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.maximum(left, right) / np.abs(left - right)
+    lengths = np.where((left > 0) & (right > 0), 1.0, np.where((left > 0) | (right > 0), share, 0.0))
+    return float(lengths.sum())

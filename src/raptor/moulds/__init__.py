@@ -1,0 +1,19 @@
+"""Moulds: geometry, file format, random generator, the paper's standard moulds."""
+
+from raptor.moulds.geojson import read_mould, read_moulds, write_moulds
+from raptor.moulds.geometry import IMAGE_SIZE, Circle, Mould, PolygonTether, Tether
+from raptor.moulds.raster import MouldImage, mould_image, pixel_centres
+
+__all__ = [
+    "IMAGE_SIZE",
+    "Circle",
+    "Mould",
+    "MouldImage",
+    "PolygonTether",
+    "Tether",
+    "mould_image",
+    "pixel_centres",
+    "read_mould",
+    "read_moulds",
+    "write_moulds",
+]

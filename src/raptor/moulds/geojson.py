@@ -1,0 +1,122 @@
+"""Mould files: GeoJSON, one feature a mould, tethers in its properties (see docs/data.md)."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import shapely
+
+from raptor.errors import RaptorError
+from raptor.files import atomic_path
+from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
+
+
+def read_moulds(path: Path) -> list[Mould]:
+    """Read every mould of a FeatureCollection.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is missing, empty, not GeoJSON, or a mould in it cannot be cast.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise RaptorError(f"mould file {path} does not exist; check the path")
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if not text.strip():
+        raise RaptorError(f"mould file {path} is empty; a GeoJSON polygon is expected")
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise RaptorError(f"mould file {path} is not GeoJSON: {error}") from error
+    kind = document.get("type") if isinstance(document, dict) else None
+    if kind == "FeatureCollection":
+        features = document.get("features") or []
+    elif kind == "Feature":
+        features = [document]
+    elif kind == "Polygon":
+        features = [{"geometry": document, "properties": {}}]
+    else:
+        raise RaptorError(
+            f"mould file {path} holds {kind or 'no GeoJSON type'}; a Feature, a FeatureCollection "
+            "or a Polygon is expected"
+        )
+    if not features:
+        raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
+    return [_mould(feature, path) for feature in features]
+
+
+def read_mould(path: Path) -> Mould:
+    """Read a file that holds one mould.
+
+    Raises
+    ------
+    RaptorError
+        As `read_moulds`, and where the file holds more than one feature.
+    """
+    moulds = read_moulds(path)
+    if len(moulds) > 1:
+        raise RaptorError(
+            f"mould file {path} gives the depression in {len(moulds)} pieces; a mould is one "
+            "connected outline, so keep one feature"
+        )
+    return moulds[0]
+
+
+def write_moulds(path: Path, moulds: Iterable[Mould]) -> None:
+    """Write moulds as a FeatureCollection, whole or not at all."""
+    collection = {
+        "type": "FeatureCollection",
+        "description": "RAPTOR moulds; lengths in l0, origin at the image centre",
+        "features": [mould.as_feature() for mould in moulds],
+    }
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(collection, indent=1) + "\n", encoding="utf-8")
+
+
+def _mould(feature: dict[str, Any], path: Path) -> Mould:
+    properties = feature.get("properties") or {}
+    name = str(properties.get("mould", path.stem))
+    where = f"mould file {path}, {name}"
+    geometry = feature.get("geometry") or {}
+    if geometry.get("type") == "MultiPolygon":
+        raise RaptorError(
+            f"{where}: the depression is given in {len(geometry.get('coordinates') or [])} pieces; "
+            "a mould is one connected outline"
+        )
+    if geometry.get("type") != "Polygon":
+        raise RaptorError(f"{where}: geometry is {geometry.get('type')}; a Polygon is expected")
+    rings = geometry.get("coordinates") or []
+    if len(rings) > 1:
+        raise RaptorError(f"{where}: the outline has a hole; describe what stands in it as tethers")
+    outline = _polygon(rings[0] if rings else [], f"{where}: the outline")
+    tethers = tuple(
+        _tether(entry, f"{where}: tether {number}")
+        for number, entry in enumerate(properties.get("tethers") or [], start=1)
+    )
+    symmetry = str(properties.get("symmetry", "unknown"))
+    try:
+        return Mould(outline, tethers, symmetry, name)
+    except RaptorError as error:
+        raise RaptorError(f"mould file {path}: {error}") from error
+
+
+def _tether(entry: Any, what: str) -> Tether:
+    if isinstance(entry, dict) and set(entry) == {"polygon"}:
+        return PolygonTether(_polygon(entry["polygon"], what))
+    if isinstance(entry, dict) and set(entry) == {"x", "y", "radius"}:
+        try:
+            return Circle(*(float(entry[key]) for key in ("x", "y", "radius")))
+        except (TypeError, ValueError) as error:
+            raise RaptorError(f"{what}: x, y and radius must be numbers ({error})") from error
+    raise RaptorError(f'{what} must be {{"x", "y", "radius"}} or {{"polygon": [[x, y], ...]}}')
+
+
+def _polygon(ring: Any, what: str) -> shapely.Polygon:
+    try:
+        if len(ring) < 3:
+            raise ValueError("at least three corners are needed")
+        return shapely.Polygon([(float(corner[0]), float(corner[1])) for corner in ring])
+    except (TypeError, ValueError, IndexError, KeyError) as error:
+        raise RaptorError(f"{what} is not a list of [x, y] corners: {error}") from error

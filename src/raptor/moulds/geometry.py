@@ -1,0 +1,196 @@
+"""A mould: the outline of its depression and the tethers that stand in it. Lengths in l0."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.validation import explain_validity
+
+from raptor.errors import RaptorError
+
+IMAGE_SIZE = 62.5
+"""Side of the square image, in l0; its centre is the origin (paper: 256 pixels of 125/512 l0)."""
+
+SYMMETRIES = ("none", "mirror", "mirrors", "half_turn", "square")
+STRICTLY = 1e-9  # a site this close to a wall does not hold a cell
+CIRCLE_SEGMENTS = 64  # a quarter circle, where a circle must be drawn as a polygon
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A round post: centre and radius in l0."""
+
+    x: float
+    y: float
+    radius: float
+
+    @cached_property
+    def polygon(self) -> shapely.Polygon:
+        """The post as a polygon, for drawing and for relations between shapes."""
+        return shapely.Point(self.x, self.y).buffer(self.radius, quad_segs=CIRCLE_SEGMENTS)
+
+    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed depth of points (n, 2) inside the post, (n,), l0; negative outside."""
+        return self.radius - np.hypot(points[:, 0] - self.x, points[:, 1] - self.y)
+
+    def transformed(self, matrix: NDArray[np.float64]) -> "Circle":
+        """The post moved by a 2 x 2 orthogonal matrix."""
+        x, y = matrix @ (self.x, self.y)
+        return replace(self, x=float(x), y=float(y))
+
+    def scaled(self, factor: float) -> "Circle":
+        """The post scaled about the origin."""
+        return Circle(self.x * factor, self.y * factor, self.radius * factor)
+
+    def as_json(self) -> dict[str, Any]:
+        """As it stands in a mould file."""
+        return {"x": self.x, "y": self.y, "radius": self.radius}
+
+
+@dataclass(frozen=True)
+class PolygonTether:
+    """A tether of any simple outline, such as a bar."""
+
+    polygon: shapely.Polygon
+
+    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed depth of points (n, 2) inside the tether, (n,), l0; negative outside."""
+        return signed_depth(self.polygon, points)
+
+    def transformed(self, matrix: NDArray[np.float64]) -> "PolygonTether":
+        """The tether moved by a 2 x 2 orthogonal matrix."""
+        return PolygonTether(_transform(self.polygon, matrix))
+
+    def scaled(self, factor: float) -> "PolygonTether":
+        """The tether scaled about the origin."""
+        return PolygonTether(_transform(self.polygon, np.eye(2) * factor))
+
+    def as_json(self) -> dict[str, Any]:
+        """As it stands in a mould file."""
+        return {"polygon": _ring(self.polygon)}
+
+
+Tether = Circle | PolygonTether
+
+
+@dataclass(frozen=True)
+class Mould:
+    """A depression and its tethers.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon
+        The depression, without holes for the tethers, l0.
+    tethers : tuple of Tether
+        Regions inside it that hold no cells.
+    symmetry : str
+        The class that the generator drew from, one of `SYMMETRIES`, or "unknown".
+    name : str
+        Mould id or file name, for messages.
+
+    Raises
+    ------
+    RaptorError
+        Where the outline or a tether cannot be cast: see `validate`.
+    """
+
+    outline: shapely.Polygon
+    tethers: tuple[Tether, ...] = ()
+    symmetry: str = "unknown"
+    name: str = field(default="mould", compare=False)
+
+    def __post_init__(self) -> None:
+        self.validate()
+
+    def validate(self) -> None:
+        """Raise a RaptorError that names what is wrong with the mould, if anything is."""
+        _validate_polygon(self.outline, f"{self.name}: the outline")
+        half = IMAGE_SIZE / 2
+        if max(map(abs, self.outline.bounds)) > half:
+            raise RaptorError(
+                f"{self.name}: the outline reaches {max(map(abs, self.outline.bounds)):g} l0 from "
+                f"the origin, outside the image; keep it within {half} l0 in x and y"
+            )
+        for number, tether in enumerate(self.tethers, start=1):
+            what = f"{self.name}: tether {number}"
+            if isinstance(tether, Circle) and not tether.radius > 0:
+                raise RaptorError(f"{what} has radius {tether.radius}; it must be positive")
+            _validate_polygon(tether.polygon, what)
+            if not self.outline.covers(tether.polygon.buffer(-1e-3)):
+                raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
+        if self.depression.area < 1e-6:
+            raise RaptorError(f"{self.name}: the tethers cover the depression; nothing is left to cast")
+
+    @cached_property
+    def depression(self) -> shapely.Geometry:
+        """The region that holds cells: the outline less the tethers."""
+        if not self.tethers:
+            return self.outline
+        return self.outline.difference(shapely.union_all([t.polygon for t in self.tethers]))
+
+    def forbidden_depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 2) lie in a tether or outside the outline, (n,), l0.
+
+        Negative where a cell may be: minus the distance to the nearest wall.
+        """
+        depth = -signed_depth(self.outline, points)
+        for tether in self.tethers:
+            np.maximum(depth, tether.depth(points), out=depth)
+        return depth
+
+    def transformed(self, matrix: NDArray[np.float64]) -> "Mould":
+        """The mould moved by a 2 x 2 orthogonal matrix."""
+        tethers = tuple(tether.transformed(matrix) for tether in self.tethers)
+        return replace(self, outline=_transform(self.outline, matrix), tethers=tethers)
+
+    def scaled(self, factor: float) -> "Mould":
+        """The mould and its tethers scaled about the origin."""
+        tethers = tuple(tether.scaled(factor) for tether in self.tethers)
+        return replace(self, outline=_transform(self.outline, np.eye(2) * factor), tethers=tethers)
+
+    def as_feature(self) -> dict[str, Any]:
+        """The mould as a GeoJSON feature."""
+        return {
+            "type": "Feature",
+            "geometry": {"type": "Polygon", "coordinates": [_ring(self.outline)]},
+            "properties": {
+                "mould": self.name,
+                "tethers": [tether.as_json() for tether in self.tethers],
+                "symmetry": self.symmetry,
+                "area": self.depression.area,
+            },
+        }
+
+
+def signed_depth(polygon: shapely.Polygon, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points (n, 2) to a polygon's boundary, (n,), positive inside, l0."""
+    shapely.prepare(polygon)
+    inside = shapely.contains_xy(polygon, points[:, 0], points[:, 1])
+    boundary = polygon.exterior
+    shapely.prepare(boundary)
+    distance = shapely.distance(shapely.points(points), boundary)
+    return np.asarray(np.where(inside, distance, -distance), dtype=np.float64)
+
+
+def _validate_polygon(polygon: shapely.Polygon, what: str) -> None:
+    if polygon.is_empty or polygon.area == 0:
+        raise RaptorError(f"{what} is empty; give at least three corners that enclose an area")
+    if not np.isfinite(shapely.get_coordinates(polygon)).all():
+        raise RaptorError(f"{what} has a corner that is not a finite number")
+    if not polygon.is_valid:
+        raise RaptorError(
+            f"{what} is not a simple polygon ({explain_validity(polygon)}); draw it so that no edges cross"
+        )
+    if polygon.interiors:
+        raise RaptorError(f"{what} has a hole; describe what stands in the depression as tethers")
+
+
+def _transform(polygon: shapely.Polygon, matrix: NDArray[np.float64]) -> shapely.Polygon:
+    return shapely.transform(polygon, lambda xy: xy @ matrix.T)
+
+
+def _ring(polygon: shapely.Polygon) -> list[list[float]]:
+    return [[float(x), float(y)] for x, y in polygon.exterior.coords]

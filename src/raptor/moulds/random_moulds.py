@@ -1,0 +1,213 @@
+"""Random moulds with and without symmetry (paper, "Training Data"; Andrews & Hague 2023).
+
+An outline is a closed curve around the origin, r(angle), either a polygon through random corners
+or a smooth Fourier series; it is made to have the drawn symmetry, scaled to the drawn number of
+cells, and filled with small round tethers placed by the same symmetry. What cannot be cast well
+(a piece cut off, a neck too narrow, a reach out of the image) is drawn again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from raptor.errors import RaptorError
+from raptor.moulds.geometry import IMAGE_SIZE, Circle, Mould
+from raptor.symmetry import Element
+
+SMOOTH_CORNERS = 96  # corners that draw a smooth outline
+MAX_ASPECT = 2.6
+ATTEMPTS = 2000
+
+_MIRROR_Y = Element(quarter_turns=2, mirror=True)  # y -> -y
+_MIRROR_X = Element(quarter_turns=0, mirror=True)  # x -> -x
+_HALF_TURN = Element(quarter_turns=2, mirror=False)
+GROUPS: dict[str, tuple[Element, ...]] = {
+    "none": (Element(0, False),),
+    "mirror": (Element(0, False), _MIRROR_Y),
+    "half_turn": (Element(0, False), _HALF_TURN),
+    "mirrors": (Element(0, False), _MIRROR_X, _MIRROR_Y, _HALF_TURN),
+    "square": Element.all(),
+}
+"""The elements of D4 that leave a mould of each symmetry class unchanged."""
+
+
+@dataclass(frozen=True)
+class RandomMoulds:
+    """What random moulds are drawn from. Lengths in l0.
+
+    Parameters
+    ----------
+    cells : tuple of int
+        Bounds of the number of cells.
+    layers : int
+        Cell layers, which turn a number of cells into an area.
+    tethers : tuple of int
+        Bounds of the number of tethers.
+    tether_radius : tuple of float
+        Bounds of their radius, equal within a mould.
+    arm_width : float
+        The narrowest neck allowed, between walls and between tethers.
+    margin : float
+        Free rim of the image.
+    symmetry : dict
+        Weight of each symmetry class.
+    """
+
+    cells: tuple[int, int]
+    layers: int
+    tethers: tuple[int, int]
+    tether_radius: tuple[float, float]
+    arm_width: float
+    margin: float
+    symmetry: dict[str, float]
+
+    def draw(self, rng: Generator, name: str) -> Mould:
+        """Draw one mould; the same generator state gives the same mould.
+
+        Raises
+        ------
+        RaptorError
+            Where no mould that meets all bounds was found in many attempts.
+        """
+        classes = sorted(self.symmetry)
+        weights = np.array([self.symmetry[c] for c in classes])
+        symmetry = str(rng.choice(classes, p=weights / weights.sum()))
+        for _ in range(ATTEMPTS):
+            mould = self._attempt(rng, symmetry, name)
+            if mould is not None:
+                return mould
+        raise RaptorError(
+            f"no mould with {self.cells[0]} to {self.cells[1]} cells in {self.layers} layers, "
+            f"{self.tethers[0]} to {self.tethers[1]} tethers and arms of {self.arm_width} l0 was "
+            f"found in {ATTEMPTS} attempts; widen the bounds under 'moulds'"
+        )
+
+    def _attempt(self, rng: Generator, symmetry: str, name: str) -> Mould | None:
+        outline = _random_outline(rng, symmetry)
+        radius = rng.uniform(*self.tether_radius)
+        count = int(rng.integers(self.tethers[0], self.tethers[1] + 1))
+        # Cells per area of one layer is 1 / l0^2.
+        area = rng.uniform(*self.cells) / self.layers + count * np.pi * radius**2
+        outline = _scaled(outline, np.sqrt(area / outline.area))
+        if max(map(abs, outline.bounds)) > IMAGE_SIZE / 2 - self.margin:
+            return None
+        if not _wide_enough(outline, self.arm_width):
+            return None
+        tethers = self._place_tethers(rng, outline, symmetry, count, radius)
+        if tethers is None:
+            return None
+        mould = Mould(outline, tethers, symmetry, name)
+        cells = self.layers * mould.depression.area  # close to the count of sites
+        if not self.cells[0] * 1.02 <= cells <= self.cells[1] * 0.98:
+            return None
+        if mould.depression.buffer(-self.arm_width / 3).geom_type != "Polygon":
+            return None  # tethers cut it in pieces
+        return mould
+
+    def _place_tethers(
+        self, rng: Generator, outline: shapely.Polygon, symmetry: str, count: int, radius: float
+    ) -> tuple[Circle, ...] | None:
+        """Place about `count` tethers, with their images, at least an arm apart; None if crowded."""
+        room = outline.buffer(-(radius + self.arm_width / 2))
+        rim = room.difference(outline.buffer(-(radius + 2.5 * self.arm_width)))
+        if room.is_empty or count == 0:
+            return () if count == 0 else None
+        placed: list[Circle] = []
+        for _ in range(200):
+            if len(placed) >= count:
+                break
+            # Posts mostly stand near the rim, where they hold the tissue; some stand anywhere.
+            region = rim if rng.random() < 0.7 and not rim.is_empty else room
+            orbit = _orbit(_random_point(rng, region), symmetry, radius)
+            if len(placed) + len(orbit) > self.tethers[1]:
+                continue
+            if not all(shapely.contains_xy(room, post.x, post.y) for post in orbit):
+                continue  # moved out when it was put on an axis
+            if _apart(placed + orbit, 2 * radius + self.arm_width):
+                placed += orbit
+        return tuple(placed) if self.tethers[0] <= len(placed) <= self.tethers[1] else None
+
+
+def _random_outline(rng: Generator, symmetry: str) -> shapely.Polygon:
+    """A random outline of unit size with the given symmetry, exact to the last bit."""
+    group = GROUPS[symmetry]
+    sector = 2 * np.pi / len(group)
+    roughness = rng.uniform(0.0, 0.45)
+    if rng.random() < 0.5:
+        corners = int(rng.integers(1 if len(group) > 2 else 3, max(3, 14 // len(group)) + 1))
+        angles = np.sort(rng.uniform(0.02, 0.98, corners)) * sector
+        radii = 1 + roughness * rng.uniform(-1, 1, corners)
+    else:
+        angles = (np.arange(SMOOTH_CORNERS // len(group)) + 0.5) * sector * len(group) / SMOOTH_CORNERS
+        radii = 1 + roughness * _fourier(rng, angles, symmetry)
+    points = np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])
+    points = _images(points, group)
+    if symmetry != "square":
+        stretch = rng.uniform(1.0, MAX_ASPECT) ** 0.5
+        points = points * np.array([stretch, 1 / stretch])
+    if rng.random() < 0.5 and len(points) >= 3:  # the other axis of a mirror
+        points = points[:, ::-1] * np.array([-1.0, 1.0])
+    order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
+    polygon = shapely.Polygon(points[order])
+    if rng.random() < 0.3:
+        polygon = polygon.convex_hull
+    return polygon if polygon.is_valid and polygon.area > 0 else shapely.box(-1, -0.5, 1, 0.5)
+
+
+def _fourier(rng: Generator, angles: NDArray[np.float64], symmetry: str) -> NDArray[np.float64]:
+    """A smooth random function of the angle, of size about 1, with the symmetry's harmonics."""
+    step = {"none": 1, "mirror": 1, "half_turn": 2, "mirrors": 2, "square": 4}[symmetry]
+    harmonics = np.arange(step, 9, step)
+    amplitude = rng.normal(size=(2, len(harmonics))) / np.sqrt(harmonics)
+    if symmetry not in ("none", "half_turn"):
+        amplitude[1] = 0.0  # odd under the mirror
+    phase = harmonics[:, None] * angles
+    values = amplitude[0] @ np.cos(phase) + amplitude[1] @ np.sin(phase)
+    return np.asarray(np.clip(values, -1.5, 1.5) / 1.5)
+
+
+def _images(points: NDArray[np.float64], group: tuple[Element, ...]) -> NDArray[np.float64]:
+    return np.concatenate([points @ element.matrix.T for element in group])
+
+
+def _orbit(point: NDArray[np.float64], symmetry: str, radius: float) -> list[Circle]:
+    """The post and its images; on an axis where the images would overlap."""
+    x, y = point
+    if symmetry != "none":
+        x, y = (0.0 if abs(c) < radius * 1.5 else c for c in point)
+    if symmetry == "square" and abs(abs(x) - abs(y)) < radius * 1.5:
+        y = np.copysign(x, y)
+    group = GROUPS[symmetry]
+    images = _images(np.array([[x, y]]), group)
+    unique = {(float(px) + 0.0, float(py) + 0.0) for px, py in images}
+    return [Circle(px, py, radius) for px, py in sorted(unique)]
+
+
+def _apart(circles: list[Circle], distance: float) -> bool:
+    centres = np.array([(c.x, c.y) for c in circles])
+    gaps = np.linalg.norm(centres[:, None] - centres[None], axis=-1)
+    return bool((gaps[np.triu_indices(len(circles), 1)] >= distance).all())
+
+
+def _random_point(rng: Generator, region: shapely.Geometry) -> NDArray[np.float64]:
+    x0, y0, x1, y1 = region.bounds
+    for _ in range(1000):
+        point = rng.uniform((x0, y0), (x1, y1))
+        if shapely.contains_xy(region, *point):
+            return point
+    return np.array(region.representative_point().coords[0])
+
+
+def _wide_enough(outline: shapely.Polygon, width: float) -> bool:
+    """Whether the outline stays whole, and keeps nearly all its area, when thin arms are removed."""
+    core = outline.buffer(-width / 2)
+    if core.is_empty or core.geom_type != "Polygon":
+        return False
+    return bool(core.buffer(width / 2).area > 0.96 * outline.area)
+
+
+def _scaled(polygon: shapely.Polygon, factor: float) -> shapely.Polygon:
+    return shapely.transform(polygon, lambda xy: xy * factor)

@@ -1,0 +1,122 @@
+"""Cell and matrix parameters, with their units and bounds.
+
+Units: the nearest-neighbour bond length l0 and spring constant kappa0 are 1; everything is
+dimensionless.
+"""
+
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+from raptor.errors import RaptorError
+
+SHELL_DISTANCE = {1: 1.0, 2: sqrt(2.0), 3: sqrt(3.0), 4: 2.0}
+"""Distance of the neighbour shells of the face-centred-cubic lattice, in l0."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A half-open interval [lower, upper)."""
+
+    lower: float
+    upper: float
+
+    def __contains__(self, value: float) -> bool:
+        return self.lower <= value < self.upper
+
+
+# The paper's training box (section "Training Data").
+DELTA = Bounds(0.05, 0.95)
+KAPPA_NNN = Bounds(0.1, 0.71)
+KAPPA_NNNN = Bounds(0.01, 0.5)
+
+
+def largest_kappa_nnnn(kappa_nnn: float) -> float:
+    """Upper bound of kappa_nnnn at a given kappa_nnn, in kappa0 (paper, "Training Data")."""
+    return kappa_nnn / sqrt(2.0)
+
+
+@dataclass(frozen=True)
+class CellParameters:
+    """What the cells and the matrix are made of.
+
+    Parameters
+    ----------
+    delta : float
+        Strength of the cell-matrix interaction, dimensionless, 0 <= delta < 1.
+    kappa_nnn, kappa_nnnn : float
+        Spring constants of the second and third kind of bond, in kappa0, each in [0, 1].
+
+    Raises
+    ------
+    RaptorError
+        Where a value is outside what the model can simulate.
+    """
+
+    delta: float
+    kappa_nnn: float
+    kappa_nnnn: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.delta) and 0 <= self.delta < 1):
+            raise RaptorError(f"delta is {self.delta}; the model allows 0 <= delta < 1")
+        for name in ("kappa_nnn", "kappa_nnnn"):
+            value = getattr(self, name)
+            if not (isfinite(value) and 0 <= value <= 1):
+                raise RaptorError(f"{name} is {value}; the model allows 0 <= {name} <= 1")
+
+    def require_sampled(self, where: str) -> "CellParameters":
+        """Return self if inside the paper's box (closed, for the edge set), else raise.
+
+        Raises
+        ------
+        RaptorError
+            Where a parameter lies outside the box that sampling, prediction and fitting keep to.
+        """
+        for name, bounds in (("delta", DELTA), ("kappa_nnn", KAPPA_NNN), ("kappa_nnnn", KAPPA_NNNN)):
+            value = getattr(self, name)
+            if not bounds.lower <= value <= bounds.upper:
+                raise RaptorError(
+                    f"{where}: {name} is {value}; it must lie between {bounds.lower} and "
+                    f"{bounds.upper}, the range that training covers"
+                )
+        largest = largest_kappa_nnnn(self.kappa_nnn)
+        if self.kappa_nnnn > largest * (1 + 1e-12):
+            raise RaptorError(
+                f"{where}: kappa_nnnn is {self.kappa_nnnn}, above kappa_nnn/sqrt(2) = "
+                f"{largest:.4g}; lower kappa_nnnn or raise kappa_nnn"
+            )
+        return self
+
+
+@dataclass(frozen=True)
+class NetworkModel:
+    """The choices that the paper leaves open (see docs of each key in config/README.md).
+
+    Parameters
+    ----------
+    layers : int
+        Cell layers between the mould floor and the fill height.
+    shells : tuple of int
+        Neighbour shells of kappa0, kappa_nnn and kappa_nnnn, the first always 1.
+    tension : str
+        "hooke": k (|l| - L'), the derivative of the energy; "literal": k L', the paper's formula.
+    """
+
+    layers: int
+    shells: tuple[int, int, int] = (1, 2, 3)
+    tension: str = "hooke"
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.layers <= 64:
+            raise RaptorError(f"layers is {self.layers}; 1 to 64 are allowed")
+        if self.shells not in ((1, 2, 3), (1, 2, 4), (1, 3, 4)):
+            raise RaptorError(
+                f"shells is {list(self.shells)}; allowed are [1, 2, 3], [1, 2, 4] and [1, 3, 4]"
+            )
+        if self.tension not in ("hooke", "literal"):
+            raise RaptorError(f"tension is '{self.tension}'; allowed are hooke and literal")
+
+    @property
+    def height(self) -> float:
+        """Fill height above the mould floor, in l0."""
+        return self.layers / sqrt(2.0)

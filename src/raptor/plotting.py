@@ -1,0 +1,215 @@
+"""Figures. Each function draws onto a new figure from plain data; `save` writes it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from raptor.files import atomic_path
+from raptor.metrics import BULK
+from raptor.moulds.geometry import IMAGE_SIZE, Mould
+from raptor.symmetry import FIELDS
+
+SEQUENTIAL, DIVERGING = "cividis", "PuOr"  # perceptually uniform; safe for the colour-blind
+SIMULATED, PREDICTED, THIRD = "#33508a", "#d98c21", "#6b6b6b"
+LABELS = {
+    "density": "density $P$", "tension": "tension $T$", "sxsx": "$S_x S_x$", "sysy": "$S_y S_y$",
+    "szsz": "$S_z S_z$", "sxsy": "$S_x S_y$", "sxsz": "$S_x S_z$", "sysz": "$S_y S_z$",
+}  # fmt: skip
+BULK_LABELS = {
+    "P": "mean density $P$", "N": "pixels of tissue $N(P > P_c)$", "T": "mean $T$",
+    "Tbar": r"mean $\bar{T}$", "SxSx": "mean $S_x S_x$", "SxSxbar": r"mean $\overline{S_x S_x}$",
+    "SySy": "mean $S_y S_y$", "SySybar": r"mean $\overline{S_y S_y}$",
+}  # fmt: skip
+STYLE = {
+    "svg.hashsalt": "raptor", "svg.fonttype": "none", "font.size": 9, "axes.titlesize": 9,
+    "axes.spines.top": False, "axes.spines.right": False, "figure.dpi": 120, "savefig.dpi": 150,
+}  # fmt: skip
+HALF = IMAGE_SIZE / 2
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, size in inches, in the house style."""
+    with mpl.rc_context(STYLE):
+        return Figure(figsize=(width, height), layout="constrained")
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """Write a figure as PNG and SVG, the same bytes for the same data."""
+    with mpl.rc_context(STYLE):
+        for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
+            with atomic_path(stem.with_name(stem.name + suffix)) as temporary:
+                figure.savefig(temporary, metadata=metadata)
+
+
+def draw_mould(axes: Axes, mould: Mould, *, fill: bool = True) -> None:
+    """Outline of a depression, and its tethers, in l0."""
+    outline = np.asarray(mould.outline.exterior.coords)
+    axes.add_patch(
+        Polygon(outline, closed=True, facecolor="#e9e4d4" if fill else "none", edgecolor="#444444", lw=0.8)
+    )
+    for tether in mould.tethers:
+        corners = np.asarray(tether.polygon.exterior.coords)
+        axes.add_patch(Polygon(corners, closed=True, facecolor="#b5402f", edgecolor="none"))
+    axes.set(xlim=(-HALF, HALF), ylim=(-HALF, HALF), aspect="equal", xticks=[], yticks=[])
+
+
+def show_field(axes: Axes, image: NDArray[np.floating], field: str, limit: float) -> Any:
+    """One field (y, x); signed fields on a scale symmetric about zero."""
+    signed = field in ("tension", "sxsy", "sxsz", "sysz")
+    shown = axes.imshow(
+        image,
+        origin="lower",
+        extent=(-HALF, HALF, -HALF, HALF),
+        cmap=DIVERGING if signed else SEQUENTIAL,
+        vmin=-limit if signed else 0.0,
+        vmax=limit,
+        interpolation="nearest",
+    )
+    axes.set(xticks=[], yticks=[])
+    return shown
+
+
+def fields_figure(simulated: NDArray[np.floating], predicted: NDArray[np.floating], mould: Mould) -> Figure:
+    """The paper's first figure: a mould, and its eight fields (8, y, x) simulated and predicted."""
+    figure = new_figure(11.0, 6.4)
+    left, right = figure.subfigures(1, 2, width_ratios=[1, 5.2])
+    axes = left.add_subplot()
+    draw_mould(axes, mould)
+    axes.set_title(f"mould {mould.name}\n(image {IMAGE_SIZE:g} $l_0$ wide)")
+    grid = right.subplots(4, 4)
+    for number, field in enumerate(FIELDS):
+        row, column = 2 * (number // 4), number % 4
+        limit = float(np.percentile(np.abs(simulated[number]), 99.8)) or 1.0
+        for offset, (source, stack) in enumerate((("simulation", simulated), ("prediction", predicted))):
+            shown = show_field(grid[row + offset, column], stack[number], field, limit)
+            if column == 0:
+                grid[row + offset, column].set_ylabel(source)
+        grid[row, column].set_title(LABELS[field])
+        right.colorbar(shown, ax=grid[row : row + 2, column], shrink=0.8, format="%.2g")
+    return figure
+
+
+def bulk_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
+    """The paper's scatter: eight bulk statistics, predicted against simulated, and their r."""
+    figure = new_figure(10.5, 5.6)
+    for axes, name in zip(figure.subplots(2, 4).ravel(), BULK, strict=True):
+        scatter(axes, metrics[f"{name}_simulated"], metrics[f"{name}_predicted"])
+        axes.set_title(f"{BULK_LABELS[name]}\n$r$ = {summary['bulk'][name]['pearson']:.3f}")
+    figure.supxlabel("CONDOR simulation")
+    figure.supylabel("surrogate's prediction")
+    return figure
+
+
+def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
+    """Predicted against simulated, with the line of perfect agreement."""
+    low = float(min(simulated.min(), predicted.min()))
+    high = float(max(simulated.max(), predicted.max()))
+    pad = 0.05 * (high - low) or 1.0
+    axes.plot([low - pad, high + pad], [low - pad, high + pad], "--", color=THIRD, lw=0.8)
+    axes.plot(simulated, predicted, "o", color=SIMULATED, ms=4, alpha=0.75, mec="none")
+    axes.set(xlim=(low - pad, high + pad), ylim=(low - pad, high + pad), box_aspect=1)
+
+
+def training_figure(history: pd.DataFrame) -> Figure:
+    """Losses and validation error, epoch by epoch; the kept weights are marked."""
+    figure = new_figure(9.0, 3.0)
+    losses, error = figure.subplots(1, 2)
+    losses.plot(history["epoch"], history["l1"] * 100, color=SIMULATED, label="100 x L1")
+    losses.plot(history["epoch"], history["discriminator_loss"], color=PREDICTED, label="discriminator")
+    losses.set(xlabel="epoch", ylabel="loss", yscale="log")
+    losses.legend(frameon=False)
+    error.plot(history["epoch"], history["validation_error"], color=SIMULATED)
+    best = history.loc[history["validation_error"].idxmin()]
+    error.plot(best["epoch"], best["validation_error"], "o", color=PREDICTED)
+    error.set_title(f"weights kept: epoch {best['epoch']:.0f}, {best['validation_error']:.3f}")
+    error.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))
+    return figure
+
+
+def design_figure(design: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
+    """Distributions of the parameters and of the moulds, and a few moulds drawn."""
+    figure = new_figure(11.0, 6.0)
+    top, bottom = figure.subfigures(2, 1, height_ratios=[1.2, 1])
+    panels = top.subplots(1, 4)
+    panels[0].hist(design["delta"], bins=18, range=(0.05, 0.95), color=SIMULATED)
+    panels[0].set(xlabel=r"$\Delta$", ylabel="simulations")
+    panels[1].plot(design["kappa_nnn"], design["kappa_nnnn"], ".", color=SIMULATED, ms=4)
+    panels[1].plot([0.1, 0.71], [0.1 / np.sqrt(2), 0.71 / np.sqrt(2)], "--", color=THIRD, lw=0.8)
+    panels[1].set(xlabel=r"$\kappa_{NNN}/\kappa_0$", ylabel=r"$\kappa_{NNNN}/\kappa_0$")
+    panels[2].hist([m.depression.area for m in moulds], bins=15, color=SIMULATED)
+    panels[2].set(xlabel="area of the depression ($l_0^2$)")
+    names, counts = np.unique([m.symmetry for m in moulds], return_counts=True)
+    panels[3].barh(names, counts, color=SIMULATED)
+    panels[3].set(xlabel="moulds by symmetry class")
+    for axes, mould in zip(bottom.subplots(1, 8), moulds, strict=False):
+        draw_mould(axes, mould)
+    return figure
+
+
+def fit_figure(
+    mould: Mould,
+    densities: Mapping[str, NDArray[np.floating]],
+    threshold: float,
+    rows: Sequence[Mapping[str, Any]],
+) -> Figure:
+    """Densities (y, x) of a fitted tissue in its mould, its outline, and the ratios beside the target."""
+    figure = new_figure(10.5, 3.4)
+    panels = figure.subplots(1, len(densities) + 1)
+    limit = max(float(density.max()) for density in densities.values())
+    for axes, (name, density) in zip(panels, densities.items(), strict=False):
+        shown = show_field(axes, density, "density", limit)
+        axes.contour(
+            density, [threshold], origin="lower", extent=(-HALF, HALF, -HALF, HALF), colors="white", linewidths=0.8
+        )
+        draw_mould(axes, mould, fill=False)
+        axes.set_title(name)
+    figure.colorbar(shown, ax=panels[:-1], shrink=0.8, label="density per pixel")
+    colours = (THIRD, PREDICTED, SIMULATED)
+    for offset, (row, colour) in enumerate(zip(rows, colours, strict=False)):
+        values = [row["area_ratio"], row["width_ratio"]]
+        heights = [np.nan if value is None else value for value in values]
+        panels[-1].bar(np.arange(2) + 0.27 * (offset - 1), heights, 0.25, color=colour, label=row["source"])
+    panels[-1].set_xticks([0, 1], ["$A/A_0$", "$w/w_0$"])
+    panels[-1].set_ylim(0, 1.35)
+    panels[-1].legend(frameon=False, loc="upper center", fontsize=8)
+    return figure
+
+
+def tradeoff_figure(table: pd.DataFrame) -> Figure:
+    """Error of the density field against cost, by method: one small point a mould, a large mean."""
+    figure = new_figure(6.0, 4.0)
+    axes = figure.subplots()
+    colours = dict(zip(table["method"].unique(), ("#8a3355", SIMULATED, "#3c8a5a", PREDICTED), strict=False))
+    for method, group in table.groupby("method", sort=False):
+        colour = colours[method]
+        axes.plot(group["core_seconds"], group["density_error"], ".", color=colour, alpha=0.6)
+        middle = np.exp(np.log(group[["core_seconds", "density_error"]]).mean())
+        axes.plot(middle.iloc[0], middle.iloc[1], "o", color=colour, ms=9)
+        axes.annotate(f"{method}", middle.to_numpy(), xytext=(8, 6), textcoords="offset points", color=colour)
+    axes.axhline(1.0, color=THIRD, ls="--", lw=0.8)
+    axes.set(xscale="log", yscale="log", xlabel="core-seconds a run")
+    axes.set_ylabel("density error / seed-to-seed spread")
+    return figure
+
+
+def save_fields(path: Path, stacks: Mapping[str, NDArray[np.floating]]) -> None:
+    """Write the field stacks (8, y, x) that a figure draws, by name, as netCDF."""
+    data = xr.Dataset(
+        {
+            name: (("field", "y", "x"), stack.astype(np.float32), {"long_name": name, "units": "1"})
+            for name, stack in stacks.items()
+        },
+        coords={"field": list(FIELDS)},
+        attrs={"title": "Fields of a figure, per pixel", "Conventions": "CF-1.11"},
+    )
+    with atomic_path(path) as temporary:
+        data.to_netcdf(temporary)

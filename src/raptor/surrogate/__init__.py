@@ -1,0 +1,1 @@
+"""The surrogate: pix2pix, from mould and parameters to the eight fields."""

@@ -1,0 +1,121 @@
+"""Prediction: from a mould and parameters to the eight fields, in physical units."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from raptor import MODEL_VERSION
+from raptor.dataset.scaling import Scaling, scale_inputs
+from raptor.errors import RaptorError
+from raptor.files import atomic_path
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.parameters import CellParameters
+from raptor.surrogate.networks import Architecture, Generator
+
+BATCH = 16
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """A trained generator with what is needed to use it without its data set."""
+
+    generator: Generator
+    architecture: Architecture
+    scaling: Scaling
+    layers: int
+
+    def predict(
+        self,
+        depression: NDArray[Any],
+        tethers: NDArray[Any],
+        parameters: Sequence[CellParameters],
+    ) -> NDArray[np.float32]:
+        """Fields (n, 8, y, x) in physical units of one mould's masks (y, x) at n parameters.
+
+        Raises
+        ------
+        RaptorError
+            Where the masks have another size than the network, or parameters are out of its range.
+        """
+        pixels = self.architecture.pixels
+        if depression.shape != (pixels, pixels):
+            raise RaptorError(f"masks are {depression.shape}; this model takes {pixels} x {pixels} pixels")
+        for values in parameters:
+            values.require_sampled("prediction")
+        self.generator.eval()
+        parts = []
+        with torch.no_grad():
+            for start in range(0, len(parameters), BATCH):
+                batch = [
+                    scale_inputs(depression, tethers, values)
+                    for values in parameters[start : start + BATCH]
+                ]
+                scaled = self.generator(torch.from_numpy(np.stack(batch)))
+                parts.append(self.scaling.inverse(scaled.numpy()))
+        return np.concatenate(parts)
+
+    def predict_mould(self, mould: Mould, parameters: CellParameters) -> NDArray[np.float32]:
+        """Fields (8, y, x) of a mould at one set of parameters."""
+        image = mould_image(mould, self.architecture.pixels)
+        return np.asarray(self.predict(image.depression, image.tethers, [parameters])[0])
+
+
+def save(
+    folder: Path,
+    weights: dict[str, Tensor],
+    architecture: Architecture,
+    scaling: Scaling,
+    layers: int,
+    description: dict[str, Any],
+) -> None:
+    """Write weights.safetensors and model.json."""
+    with atomic_path(folder / "weights.safetensors") as temporary:
+        save_file({name: value.contiguous() for name, value in weights.items()}, temporary)
+    content = {
+        **description,
+        "architecture": architecture.as_json(),
+        "normalisation": scaling.as_json(),
+        "layers": layers,
+        "model_version": MODEL_VERSION,
+    }
+    with atomic_path(folder / "model.json") as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def load(folder: Path) -> Surrogate:
+    """Load a model from its folder.
+
+    Raises
+    ------
+    RaptorError
+        Where a file is missing or cut short, or the weights do not fit the model.
+    """
+    folder = Path(folder)
+    try:
+        content = json.loads((folder / "model.json").read_text())
+        architecture = Architecture(**content["architecture"])
+        scaling, layers = Scaling.from_json(content["normalisation"]), int(content["layers"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RaptorError(f"{folder / 'model.json'} cannot be read: {error}") from error
+    generator = Generator(architecture)
+    try:
+        generator.load_state_dict(load_file(folder / "weights.safetensors"))
+    except (OSError, SafetensorError) as error:
+        raise RaptorError(f"{folder / 'weights.safetensors'} cannot be read: {error}") from error
+    except RuntimeError as error:
+        raise RaptorError(
+            f"{folder / 'weights.safetensors'} does not fit the model that model.json describes; "
+            f"keep the two files of one training together ({str(error).splitlines()[0]})"
+        ) from error
+    generator.eval()
+    return Surrogate(generator, architecture, scaling, layers)

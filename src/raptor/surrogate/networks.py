@@ -1,0 +1,141 @@
+"""pix2pix (Isola et al. 2017, arXiv:1611.07004): U-Net generator and PatchGAN discriminator."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from raptor.dataset.scaling import INPUTS
+from raptor.errors import RaptorError
+from raptor.symmetry import FIELDS
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Sizes of the networks.
+
+    Parameters
+    ----------
+    pixels : int
+        Side of the images, a power of two from 16 to 1024.
+    base_channels : int
+        Channels of the first layer (64 in pix2pix); deeper layers have up to 8 times as many.
+    dropout : float
+        In the three deepest decoder layers (0.5 in pix2pix).
+    patch_layers : int
+        Strided layers of the discriminator: 3 see patches of 70 x 70 pixels.
+    """
+
+    pixels: int
+    base_channels: int
+    dropout: float = 0.5
+    patch_layers: int = 3
+
+    def __post_init__(self) -> None:
+        if not (16 <= self.pixels <= 1024 and self.pixels & (self.pixels - 1) == 0):
+            raise RaptorError(f"pixels is {self.pixels}; a power of two from 16 to 1024 is needed")
+
+    def as_json(self) -> dict[str, Any]:
+        """As it stands in model.json."""
+        return asdict(self)
+
+
+class _Down(nn.Sequential):
+    """Halve the image: strided convolution, normalisation where there is something to average."""
+
+    def __init__(self, before: int, after: int, normalise: bool, activate: bool = True) -> None:
+        layers: list[nn.Module] = [nn.LeakyReLU(0.2)] if activate else []
+        layers.append(nn.Conv2d(before, after, 4, stride=2, padding=1, bias=not normalise))
+        if normalise:
+            layers.append(nn.BatchNorm2d(after))
+        super().__init__(*layers)
+
+
+class _Up(nn.Sequential):
+    """Double the image: transposed convolution, normalisation, dropout in the deepest layers."""
+
+    def __init__(self, before: int, after: int, dropout: float) -> None:
+        layers: list[nn.Module] = [
+            nn.ReLU(),
+            nn.ConvTranspose2d(before, after, 4, stride=2, padding=1, bias=False),
+            nn.BatchNorm2d(after),
+        ]
+        if dropout > 0:
+            layers.append(nn.Dropout(dropout))
+        super().__init__(*layers)
+
+
+class Generator(nn.Module):
+    """U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled."""
+
+    def __init__(self, architecture: Architecture) -> None:
+        super().__init__()
+        depth = int(math.log2(architecture.pixels))
+        channels = [architecture.base_channels * min(2**level, 8) for level in range(depth)]
+        self.down = nn.ModuleList()
+        for level, after in enumerate(channels):
+            before = channels[level - 1] if level else len(INPUTS)
+            inner = 0 < level < depth - 1
+            self.down.append(_Down(before, after, normalise=inner, activate=level > 0))
+        self.up = nn.ModuleList()
+        for level in range(depth - 1, 0, -1):
+            before = channels[level] * (1 if level == depth - 1 else 2)
+            dropout = architecture.dropout if level >= depth - 3 else 0.0
+            self.up.append(_Up(before, channels[level - 1], dropout))
+        self.last = nn.Sequential(
+            nn.ReLU(), nn.ConvTranspose2d(2 * channels[0], len(FIELDS), 4, stride=2, padding=1)
+        )
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Predict scaled fields. The last layer is linear: fields of new moulds may exceed 1."""
+        skips = []
+        features = inputs
+        for down in self.down:
+            features = down(features)
+            skips.append(features)
+        features = skips.pop()
+        for up in self.up:
+            features = torch.cat([up(features), skips.pop()], dim=1)
+        return self.last(features)  # type: ignore[no-any-return]
+
+
+class Discriminator(nn.Module):
+    """PatchGAN: judges each patch of inputs and fields together; returns logits (n, 1, y', x')."""
+
+    def __init__(self, architecture: Architecture) -> None:
+        super().__init__()
+        base = architecture.base_channels
+        before = len(INPUTS) + len(FIELDS)
+        layers: list[nn.Module] = []
+        for level in range(architecture.patch_layers):
+            after = base * min(2**level, 8)
+            layers.append(_Down(before, after, normalise=level > 0, activate=level > 0))
+            before = after
+        after = base * min(2**architecture.patch_layers, 8)
+        layers += [
+            nn.LeakyReLU(0.2),
+            nn.Conv2d(before, after, 4, padding=1, bias=False),
+            nn.BatchNorm2d(after),
+            nn.LeakyReLU(0.2),
+            nn.Conv2d(after, 1, 4, padding=1),
+        ]
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, inputs: Tensor, fields: Tensor) -> Tensor:
+        """Logits of "these fields belong to these inputs", patch by patch."""
+        return self.layers(torch.cat([inputs, fields], dim=1))  # type: ignore[no-any-return]
+
+
+def initialise(network: nn.Module) -> nn.Module:
+    """Weights from N(0, 0.02), as published."""
+    for module in network.modules():
+        if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
+            nn.init.normal_(module.weight, 0.0, 0.02)
+            if module.bias is not None:
+                nn.init.zeros_(module.bias)
+        elif isinstance(module, nn.BatchNorm2d):
+            nn.init.normal_(module.weight, 1.0, 0.02)
+            nn.init.zeros_(module.bias)
+    return network

@@ -1,0 +1,50 @@
+"""Validation before anything runs, and what all rules share."""
+
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from raptor import MODEL_VERSION, configuration
+from raptor.compiled import source_hash
+from raptor.errors import RaptorError
+
+try:
+    CONFIG = configuration.parse(config, "configuration")
+    TISSUES = configuration.load_tissues(Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues)
+except RaptorError as error:
+    raise WorkflowError(str(error))
+
+RESULTS = f"results/{CONFIG.name}"
+MODEL = f"{RESULTS}/surrogate/{CONFIG.surrogate.model}"
+FIGURES = ("design", "fields", "bulk", "training", "tradeoff")
+
+
+wildcard_constraints:
+    shard=r"\d+-\d+",
+    tissue="|".join(CONFIG.fit.tissues),
+    figure="|".join(FIGURES),
+
+
+localrules:
+    record_configuration,
+
+
+rule record_configuration:
+    """Write the configuration as it was understood, defaults included, for the report."""
+    output:
+        configuration=report(
+            f"{RESULTS}/configuration.yaml",
+            caption="../report/configuration.rst",
+            category="Configuration",
+        ),
+    log:
+        f"{RESULTS}/logs/record_configuration.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/record_configuration.tsv"
+    params:
+        configuration=CONFIG.model_dump(mode="json"),
+    threads: 1
+    resources:
+        mem_mb=200,
+    script:
+        "../scripts/record_configuration.py"

@@ -1,0 +1,45 @@
+"""CONDOR simulations, in shards."""
+
+
+rule compile_kernels:
+    """Compile the kernels once, before many jobs would do it at the same time."""
+    output:
+        kernels=f"{RESULTS}/simulations/kernels.json",
+    log:
+        f"{RESULTS}/logs/compile_kernels.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/compile_kernels.tsv"
+    params:
+        sources=source_hash(),
+    threads: 1
+    resources:
+        mem_mb=1000,
+    retries: 1
+    script:
+        "../scripts/compile_kernels.py"
+
+
+rule simulate_shard:
+    """Simulate some runs of the design, one after another, into one file."""
+    input:
+        design=rules.sample_design.output.design,
+        moulds=rules.sample_design.output.moulds,
+        kernels=ancient(rules.compile_kernels.output.kernels),
+    output:
+        shard=f"{RESULTS}/simulations/{{shard}}.nc",
+    log:
+        f"{RESULTS}/logs/simulate_shard/{{shard}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/simulate_shard/{{shard}}.tsv"
+    params:
+        configuration=CONFIG.fingerprint("simulation"),
+        layers=CONFIG.model.layers,
+        shells=CONFIG.model.shells,
+        tension=CONFIG.model.tension,
+        accuracy=CONFIG.simulation.accuracy,
+    threads: 1
+    resources:
+        mem_mb=lambda wildcards, attempt: 1000 * attempt,
+    retries: 2
+    script:
+        "../scripts/simulate_shard.py"

@@ -1,0 +1,22 @@
+"""Rasterise the shards into the field stack."""
+
+from pathlib import Path
+
+from raptor.dataset.design import read_design
+from raptor.dataset.stack import build_stack
+from raptor.jobs import logged, progress
+from raptor.moulds import read_moulds
+
+with logged(snakemake.log[0]):
+    runs = read_design(Path(snakemake.input.design))
+    with progress("field stack", len(runs)) as done:
+        build_stack(
+            Path(snakemake.output.stack),
+            [Path(shard) for shard in snakemake.input.shards],
+            runs,
+            {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))},
+            snakemake.params.pixels,
+            simulation_configuration=snakemake.params.simulation_configuration,
+            configuration=snakemake.params.configuration,
+            done=lambda row: done(f"sample {row}"),
+        )

@@ -1,0 +1,25 @@
+"""Compile every kernel by one tiny simulation."""
+
+import json
+import time
+from pathlib import Path
+
+import shapely
+
+from raptor.compiled import source_hash
+from raptor.condor import simulate
+from raptor.fields import rasterise
+from raptor.files import atomic_path
+from raptor.jobs import logged
+from raptor.moulds import Mould
+from raptor.parameters import CellParameters, NetworkModel
+
+with logged(snakemake.log[0]):
+    started = time.perf_counter()
+    mould = Mould(shapely.box(-2, -2, 2, 2), name="kernels")
+    for accuracy in ("draft", "reference"):
+        tissue = simulate(mould, CellParameters(0.1, 0.5, 0.3), NetworkModel(2), accuracy)
+    rasterise(tissue.positions, tissue.orientation, tissue.tension, 32)
+    content = {"sources": source_hash(), "seconds": round(time.perf_counter() - started, 2)}
+    with atomic_path(Path(snakemake.output.kernels)) as path:
+        path.write_text(json.dumps(content) + "\n")

@@ -1,0 +1,24 @@
+"""Draw the held-out sample whose density error is the median."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.dataset.stack import read_samples, read_table
+from raptor.jobs import logged
+from raptor.moulds import read_moulds
+from raptor.plotting import fields_figure, save, save_fields
+from raptor.surrogate.inference import load
+
+with logged(snakemake.log[0]):
+    metrics = pd.read_csv(snakemake.input.metrics).sort_values("vrmse_density")
+    simulation = int(metrics["simulation"].iloc[len(metrics) // 2])
+    stack = Path(snakemake.input.stack)
+    row = read_table(stack).simulation.tolist().index(simulation)
+    (sample,) = read_samples(stack, [row])
+    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
+    surrogate = load(Path(snakemake.input.weights).parent)
+    predicted = surrogate.predict(sample.depression, sample.tethers, [sample.parameters])[0]
+    figure = fields_figure(sample.fields, predicted, moulds[sample.mould])
+    save(figure, Path(snakemake.output.png).with_suffix(""))
+    save_fields(Path(snakemake.output.data), {"simulation": sample.fields, "prediction": predicted})

@@ -1,0 +1,32 @@
+"""Draw a fitted tissue."""
+
+import json
+from pathlib import Path
+
+from raptor.dataset.shards import read_shard
+from raptor.dataset.stack import record_fields
+from raptor.jobs import logged
+from raptor.morphology import density_threshold
+from raptor.moulds import read_mould
+from raptor.plotting import fit_figure, save, save_fields
+from raptor.surrogate.inference import load
+
+with logged(snakemake.log[0]):
+    fit = json.loads(Path(snakemake.input.fit).read_text())
+    mould = read_mould(Path(snakemake.input.mould)).scaled(fit["mould_scale"])
+    (record,) = read_shard(Path(snakemake.input.tissue)).records
+    surrogate = load(Path(snakemake.input.weights).parent)
+    pixels = surrogate.architecture.pixels
+    stacks = {
+        "prediction": surrogate.predict_mould(mould, record.parameters),
+        "simulation": record_fields(record, pixels),
+    }
+    rows = [
+        {"source": "measured", **fit["target"]},
+        {"source": "prediction", **fit["surrogate"]},
+        {"source": "simulation", **fit["simulation"]},
+    ]
+    threshold = density_threshold(surrogate.layers, pixels)
+    densities = {name: stack[0] for name, stack in stacks.items()}
+    save(fit_figure(mould, densities, threshold, rows), Path(snakemake.output.png).with_suffix(""))
+    save_fields(Path(snakemake.output.data), stacks)

@@ -1,0 +1,30 @@
+"""Simulate the runs of one shard."""
+
+from pathlib import Path
+
+from raptor.dataset.design import read_design
+from raptor.dataset.shards import simulate_shard, write_shard
+from raptor.jobs import logged, progress
+from raptor.moulds import read_moulds
+from raptor.parameters import NetworkModel
+
+with logged(snakemake.log[0]):
+    first, last = (int(number) for number in snakemake.wildcards.shard.split("-"))
+    runs = [run for run in read_design(Path(snakemake.input.design)) if first <= run.simulation <= last]
+    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
+    params = snakemake.params
+    model = NetworkModel(params.layers, tuple(params.shells), params.tension)
+    with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:
+        simulations = simulate_shard(
+            runs,
+            moulds,
+            model,
+            params.accuracy,
+            lambda run, s: done(
+                f"{run.simulation}: {s.cells} cells, energy {s.energy:.5g}, "
+                f"{'converged' if s.converged else 'NOT converged'}, {s.wall_time:.2f} s"
+            ),
+        )
+    write_shard(
+        Path(snakemake.output.shard), runs, simulations, model, params.accuracy, params.configuration
+    )

@@ -1,0 +1,46 @@
+"""Train the surrogate on the data set's examples."""
+
+from pathlib import Path
+
+from raptor.dataset.examples import read_examples
+from raptor.dataset.scaling import read_scaling
+from raptor.dataset.stack import read_table
+from raptor.jobs import logged, progress
+from raptor.surrogate.inference import save
+from raptor.surrogate.networks import Architecture
+from raptor.surrogate.training import TrainingRules, describe, train, write_history
+
+with logged(snakemake.log[0]):
+    given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
+    table = read_table(stack)
+    scaling = read_scaling(Path(snakemake.input.normalisation))
+    architecture = Architecture(
+        table.pixels, given["base_channels"], given["dropout"], given["patch_layers"]
+    )
+    names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1")
+    rules = TrainingRules(
+        **{name: given[name] for name in names},
+        seed=snakemake.params.seed % 2**63,
+        threads=snakemake.threads,
+    )
+    with progress("training", rules.epochs) as done:
+        trained = train(
+            stack,
+            read_examples(Path(snakemake.input.examples)),
+            table.split,
+            scaling,
+            architecture,
+            rules,
+            Path(snakemake.params.checkpoint),
+            snakemake.params.identity,
+            lambda epoch, row: done(f"epoch {epoch}, validation error {row['validation_error']:.3f}"),
+        )
+    save(
+        Path(snakemake.output.weights).parent,
+        trained.weights,
+        architecture,
+        scaling,
+        snakemake.params.layers,
+        describe(architecture, rules),
+    )
+    write_history(Path(snakemake.output.history), trained.history)

@@ -47,6 +47,9 @@ rule all:
 
 
 rule report:
-    """What the report shows; the report itself is written after the run (--report-after-run)."""
+    """What the report shows; the report itself is written when the run ends."""
     input:
         rules.all.input,
+
+
+include: "workflow/rules/report.smk"

@@ -89,8 +89,10 @@ def evaluate(
 
 def summarise(metrics: pd.DataFrame) -> dict[str, Any]:
     """Means over the test set, and correlation, slope and error of each bulk measure."""
+    errors = ("vrmse", "nrmse", "pearson")
     fields = {
-        field: {name: float(metrics[f"{name}_{field}"].mean()) for name in ("vrmse", "nrmse", "pearson")}
+        field: {name: float(metrics[f"{name}_{field}"].mean()) for name in errors}
+        | {f"median_{name}": float(metrics[f"{name}_{field}"].median()) for name in errors}
         for field in FIELDS
     }
     return {

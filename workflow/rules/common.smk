@@ -1,5 +1,6 @@
 """Validation before anything runs, and what all rules share."""
 
+import sys
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError

@@ -140,6 +140,8 @@ def simulate(
     state = cast_state(lattice, rng)
     minimum, sweeps = _solve(state, network, walls, parameters.delta, accuracy, rng)
     state = minimum.state
+    if not mould.tethers:
+        state = _undrifted(state, lattice.sites, mould)
     return Simulation(
         sites=lattice.sites,
         positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
@@ -161,6 +163,25 @@ def cast_state(lattice: Lattice, rng: Generator) -> NDArray[np.float64]:
     orientation = rng.normal(size=(3, lattice.cells))
     orientation /= np.linalg.norm(orientation, axis=0)
     return np.concatenate([lattice.sites.T.ravel(), orientation.ravel()])
+
+
+def _undrifted(
+    state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould
+) -> NDArray[np.float64]:
+    """The state moved and turned in the plane as a whole, so that it lies as it was cast.
+
+    Nothing holds a gel without tethers: moved or turned with its cells it has the same energy.
+    Where the walls would be in the way it stays as it is.
+    """
+    blocks = state.reshape(6, -1).copy()
+    cast, found = sites[:, :2] - sites[:, :2].mean(axis=0), blocks[:2].T - blocks[:2].mean(axis=1)
+    cross = cast.T @ found
+    angle = np.arctan2(cross[1, 0] - cross[0, 1], cross[0, 0] + cross[1, 1])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    blocks[:2] = turn @ found.T + sites[:, :2].mean(axis=0)[:, None]
+    blocks[3:5] = turn @ blocks[3:5]
+    free = mould.forbidden_depth(blocks[:2].T).max() < 0
+    return blocks.ravel() if free else state
 
 
 def _solve(

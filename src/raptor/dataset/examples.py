@@ -56,8 +56,8 @@ def training_scaling(stack: Path) -> Scaling:
     """
     low, high = np.full(len(FIELDS), np.inf), np.full(len(FIELDS), -np.inf)
     for sample in read_samples(stack, read_table(stack).rows("train")):
-        low = np.minimum(low, sample.fields.min(axis=(1, 2)))
-        high = np.maximum(high, sample.fields.max(axis=(1, 2)))
+        low = np.fmin(low, sample.fields.min(axis=(1, 2)))
+        high = np.fmax(high, sample.fields.max(axis=(1, 2)))
     if not np.isfinite(low).all():
         raise RaptorError(f"{stack} has no training sample; lower design.test or design.validation")
     return fit_scaling(low, high)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,9 @@ def _polygon(ring: Any, what: str) -> shapely.Polygon:
     try:
         if len(ring) < 3:
             raise ValueError("at least three corners are needed")
-        return shapely.Polygon([(float(corner[0]), float(corner[1])) for corner in ring])
+        corners = [(float(corner[0]), float(corner[1])) for corner in ring]
+        if not all(isfinite(value) for corner in corners for value in corner):
+            raise ValueError("every coordinate must be a finite number")
+        return shapely.Polygon(corners)
     except (TypeError, ValueError, IndexError, KeyError) as error:
         raise RaptorError(f"{what} is not a list of [x, y] corners: {error}") from error

@@ -176,10 +176,9 @@ def signed_depth(polygon: shapely.Polygon, points: NDArray[np.float64]) -> NDArr
 
 
 def _validate_polygon(polygon: shapely.Polygon, what: str) -> None:
-    if polygon.is_empty or polygon.area == 0:
+    corners = np.unique(shapely.get_coordinates(polygon), axis=0)
+    if polygon.is_empty or len(corners) < 3 or polygon.convex_hull.area == 0:
         raise RaptorError(f"{what} is empty; give at least three corners that enclose an area")
-    if not np.isfinite(shapely.get_coordinates(polygon)).all():
-        raise RaptorError(f"{what} has a corner that is not a finite number")
     if not polygon.is_valid:
         raise RaptorError(
             f"{what} is not a simple polygon ({explain_validity(polygon)}); draw it so that no edges cross"

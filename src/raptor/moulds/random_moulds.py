@@ -78,7 +78,8 @@ class RandomMoulds:
         for _ in range(ATTEMPTS):
             mould = self._attempt(rng, symmetry, name)
             if mould is not None:
-                return mould
+                turned = Element(int(rng.integers(2)), mirror=False)  # a mirror may have either axis
+                return mould.transformed(turned.matrix)
         raise RaptorError(
             f"no mould with {self.cells[0]} to {self.cells[1]} cells in {self.layers} layers, "
             f"{self.tethers[0]} to {self.tethers[1]} tethers and arms of {self.arm_width} l0 was "
@@ -148,8 +149,6 @@ def _random_outline(rng: Generator, symmetry: str) -> shapely.Polygon:
     if symmetry != "square":
         stretch = rng.uniform(1.0, MAX_ASPECT) ** 0.5
         points = points * np.array([stretch, 1 / stretch])
-    if rng.random() < 0.5 and len(points) >= 3:  # the other axis of a mirror
-        points = points[:, ::-1] * np.array([-1.0, 1.0])
     order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
     polygon = shapely.Polygon(points[order])
     if rng.random() < 0.3:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,16 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from raptor import MODEL_VERSION
+from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
+from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
+from raptor.moulds.raster import mould_image, pixel_centres
 from raptor.parameters import CellParameters
 from raptor.surrogate.networks import Architecture, Generator
+from raptor.symmetry import FIELDS
 
 BATCH = 16
 
@@ -119,3 +122,26 @@ def load(folder: Path) -> Surrogate:
         ) from error
     generator.eval()
     return Surrogate(generator, architecture, scaling, layers)
+
+
+def write_prediction(
+    path: Path, surrogate: Surrogate, mould: Mould, parameters: CellParameters
+) -> tuple[float, float]:
+    """Predict a mould's fields and write them, in physical units; returns A/A0 and w/w0."""
+    fields = surrogate.predict_mould(mould, parameters)
+    pixels = fields.shape[-1]
+    threshold = density_threshold(surrogate.layers, pixels)
+    area = area_ratio(fields[0], mould_image(mould, pixels), threshold)
+    width = width_ratio(fields[0], mould, threshold)
+    with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
+        for name, size in (("sample", 1), ("field", len(FIELDS)), ("y", pixels), ("x", pixels)):
+            file.createDimension(name, size)
+        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
+        for axis in "yx":
+            variable(file, axis, (axis,), pixel_centres(pixels), f"pixel centre {axis}, in l0")
+        variable(file, "fields", ("sample", "field", "y", "x"), fields[None], "fields, per pixel")
+        for name, value in asdict(parameters).items():
+            variable(file, name, ("sample",), [value], name)
+        variable(file, "area_ratio", ("sample",), [area], "A/A0")
+        variable(file, "width_ratio", ("sample",), [width], "w/w0")
+    return area, width

@@ -1,0 +1,147 @@
+"""The command line: raptor simulate | predict | check | same | reference."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from raptor.errors import RaptorError
+
+app = typer.Typer(
+    help="Rapid prediction of tissue organisation: CONDOR simulations and their surrogate.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Mould = Annotated[Path, typer.Argument(help="mould file (GeoJSON, one feature; lengths in l0)")]
+Delta = Annotated[float, typer.Option(help="cell-matrix interaction")]
+KappaNNN = Annotated[float, typer.Option("--kappa-nnn", help="second spring constant, in kappa0")]
+KappaNNNN = Annotated[float, typer.Option("--kappa-nnnn", help="third spring constant, in kappa0")]
+Output = Annotated[Path, typer.Option(help="netCDF file to write")]
+
+
+@app.command()
+def simulate(
+    mould: Mould,
+    delta: Delta,
+    kappa_nnn: KappaNNN,
+    kappa_nnnn: KappaNNNN,
+    output: Output,
+    layers: Annotated[int, typer.Option(help="cell layers between floor and fill height")] = 7,
+    accuracy: Annotated[str, typer.Option(help="draft, standard or reference")] = "standard",
+    seed: Annotated[int, typer.Option(min=0, help="of the first orientations")] = 0,
+) -> None:
+    """Simulate one mould and write a file of the form of a shard.
+
+    Example: raptor simulate config/moulds/four_post_rectangle.geojson --delta 0.5
+    --kappa-nnn 0.5 --kappa-nnnn 0.3 --output tissue.nc
+    """
+    from raptor.condor import ACCURACIES
+    from raptor.condor import simulate as run_simulation
+    from raptor.configuration import content_hash
+    from raptor.dataset.design import Run
+    from raptor.dataset.shards import write_shard
+    from raptor.moulds import read_mould
+    from raptor.parameters import CellParameters, NetworkModel
+
+    parameters = CellParameters(delta, kappa_nnn, kappa_nnnn)
+    model = NetworkModel(layers)
+    if accuracy not in ACCURACIES:
+        raise RaptorError(f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}")
+    shape = read_mould(mould)
+    _require_writable(output)
+    tissue = run_simulation(shape, parameters, model, accuracy, seed)
+    run = Run(0, shape.name, "test", False, parameters, seed)
+    identity = content_hash([shape.as_feature(), delta, kappa_nnn, kappa_nnnn, layers, accuracy, seed])
+    write_shard(output, [run], [tissue], model, accuracy, identity)
+    state = "converged" if tissue.converged else "NOT converged"
+    typer.echo(
+        f"{output}: {tissue.cells} cells, energy {tissue.energy:.4g} kappa0 l0^2, {state}, "
+        f"folded {tissue.folded_fraction:.1e}, {tissue.wall_time:.1f} s"
+    )
+
+
+@app.command()
+def predict(
+    mould: Mould,
+    delta: Delta,
+    kappa_nnn: KappaNNN,
+    kappa_nnnn: KappaNNNN,
+    output: Output,
+    model: Annotated[Path, typer.Option(help="folder with weights.safetensors and model.json")],
+) -> None:
+    """Predict the eight fields of a mould by a trained surrogate.
+
+    Example: raptor predict config/moulds/four_post_rectangle.geojson --delta 0.5
+    --kappa-nnn 0.5 --kappa-nnnn 0.3 --model results/laptop/surrogate/pix2pix --output tissue.nc
+    """
+    from raptor.moulds import read_mould
+    from raptor.parameters import CellParameters
+    from raptor.surrogate.inference import load, write_prediction
+
+    parameters = CellParameters(delta, kappa_nnn, kappa_nnnn).require_sampled("prediction")
+    shape = read_mould(mould)
+    _require_writable(output)
+    surrogate = load(model)
+    area, width = write_prediction(output, surrogate, shape, parameters)
+    typer.echo(f"{output}: A/A0 {area:.3f}, w/w0 {width:.3f} ({surrogate.layers} layers)")
+
+
+@app.command()
+def check(path: Annotated[Path, typer.Argument(help="results folder, shard or field stack")]) -> None:
+    """Hold a data set, a shard or a field stack against its rules; name every fault."""
+    from raptor.dataset.checks import check as find_faults
+
+    if not path.exists():
+        raise RaptorError(f"{path} does not exist; check the path")
+    faults = find_faults(path)
+    for fault in faults:
+        typer.echo(fault)
+    typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")
+    raise typer.Exit(1 if faults else 0)
+
+
+@app.command()
+def same(
+    first: Annotated[Path, typer.Argument(help="results folder")],
+    second: Annotated[Path, typer.Argument(help="another one")],
+) -> None:
+    """Say whether two results folders hold the same data: bit-equal but for times."""
+    from raptor.dataset.same import differences
+
+    found = differences(first, second)
+    for difference in found:
+        typer.echo(difference)
+    typer.echo("not the same data" if found else "the same data")
+    raise typer.Exit(1 if found else 0)
+
+
+@app.command()
+def reference(
+    root: Annotated[Path, typer.Argument(help="the project's folder")] = Path(),
+) -> None:
+    """Write what is generated from the configuration model: JSON schema and key table."""
+    from raptor.configuration import write_reference
+
+    for path in write_reference(root):
+        typer.echo(path)
+
+
+def _require_writable(output: Path) -> None:
+    """Find out before the work, not after it, that the result cannot be written."""
+    if output.is_dir():
+        raise RaptorError(f"{output} is a folder; give the name of a netCDF file")
+    folder = output.parent
+    if not folder.is_dir():
+        raise RaptorError(f"folder {folder} does not exist; create it or choose another output")
+
+
+def main() -> None:
+    """Run the command line; bad input ends in one sentence and exit status 1."""
+    try:
+        app()
+    except RaptorError as error:
+        sys.stderr.write(f"error: {error}\n")
+        raise SystemExit(1) from None

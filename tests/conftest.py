@@ -1,0 +1,45 @@
+"""Shared moulds and states, small enough for slow twins."""
+
+import numpy as np
+import pytest
+import shapely
+
+from raptor.condor.lattice import build_lattice
+from raptor.moulds import Circle, Mould
+from raptor.parameters import CellParameters, NetworkModel
+from tests.small import build
+
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """A results folder; read it, do not change it."""
+    return build(tmp_path_factory.mktemp("made") / "unit", 4)
+
+
+@pytest.fixture
+def small_mould():
+    return Mould(shapely.box(-5.2, -3.3, 5.4, 3.1), (Circle(2.0, 0.5, 1.1),), name="small")
+
+
+@pytest.fixture
+def parameters():
+    return CellParameters(0.6, 0.4, 0.2)
+
+
+@pytest.fixture
+def model():
+    return NetworkModel(3)
+
+
+@pytest.fixture
+def lattice(small_mould, parameters, model):
+    return build_lattice(small_mould, parameters, model)
+
+
+@pytest.fixture
+def random_state(lattice):
+    """A disturbed lattice, far enough out of the mould that walls push back."""
+    rng = np.random.default_rng(7)
+    positions = lattice.sites + rng.normal(0, 0.25, lattice.sites.shape)
+    return np.concatenate([positions.T.ravel(), rng.normal(size=3 * lattice.cells)])

@@ -1,0 +1,194 @@
+"""Design, shards, stack, examples, scaling, checks: on a data set made here, small but real."""
+
+import shutil
+
+import netCDF4
+import numpy as np
+import pytest
+import shapely
+
+from raptor.dataset.checks import check
+from raptor.dataset.design import read_design, sample_design
+from raptor.dataset.examples import augment, training_scaling
+from raptor.dataset.same import differences
+from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
+from raptor.dataset.shards import read_shard
+from raptor.dataset.stack import build_stack, read_samples, read_table
+from raptor.errors import RaptorError
+from raptor.moulds import Mould
+from raptor.parameters import CellParameters
+from raptor.symmetry import Element, apply
+from tests.small import CONFIG, build
+
+@pytest.fixture
+def folder(made, tmp_path):
+    """A copy to spoil."""
+    shutil.copytree(made, tmp_path / "unit")
+    return tmp_path / "unit"
+
+
+def test_the_data_set_keeps_its_rules(made):
+    assert check(made) == []
+    assert check(made / "simulations" / "0.nc") == []
+    assert check(made / "dataset" / "fields.nc") == []
+
+
+def test_other_shards_give_the_same_data(made, tmp_path):
+    assert differences(made, build(tmp_path / "unit", 2)) == []
+
+
+def edit(path, name, change):
+    with netCDF4.Dataset(path, "a") as file:
+        file.set_auto_mask(False)
+        values = file[name][:]
+        change(values)
+        file[name][:] = values
+
+
+def test_a_swapped_sign_is_named(folder):
+    def swap(fields):
+        fields[2, 5] *= -1
+
+    edit(folder / "dataset" / "fields.nc", "fields", swap)
+    (fault,) = check(folder)
+    assert "simulation 2" in fault
+    assert "sxsy has the opposite sign" in fault
+
+
+def test_a_swapped_sign_of_an_orientation_is_named(folder):
+    def swap(sx):
+        sx[:50] *= -1
+
+    edit(folder / "simulations" / "0.nc", "sx", swap)
+    assert any("energy is" in fault and "recomputed" in fault for fault in check(folder))
+
+
+def test_a_mould_in_two_splits_is_named(folder):
+    splits = read_table(folder / "dataset" / "fields.nc").split
+    one, two = splits.index("train"), splits.index("test")
+
+    def copy(masks):
+        masks[two] = np.rot90(masks[one])
+
+    for name in ("depression", "tethers"):
+        edit(folder / "dataset" / "fields.nc", name, copy)
+    assert any("one mould in two splits" in fault for fault in check(folder))
+
+
+def test_nan_is_named(folder):
+    def spoil(fields):
+        fields[1, 3, 5, 5] = np.nan
+
+    edit(folder / "dataset" / "fields.nc", "fields", spoil)
+    assert any("simulation 1: NaN or infinity in sysy" in fault for fault in check(folder))
+
+
+def test_negative_density_lost_cells_and_a_broken_trace_are_named(folder):
+    def spoil(fields):
+        fields[0, 0] -= 0.1
+
+    edit(folder / "dataset" / "fields.nc", "fields", spoil)
+    faults = " ".join(check(folder / "dataset" / "fields.nc"))
+    for what in ("density is negative", "density sums to", "sxsx + sysy + szsz is not density"):
+        assert what in faults
+
+
+def test_an_example_of_the_test_split_and_a_double_one_are_named(folder):
+    path = folder / "dataset" / "examples.csv"
+    held_out = read_table(folder / "dataset" / "fields.nc").split.index("test")
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines, lines[1], f"{held_out},0"]) + "\n")
+    faults = " ".join(check(folder))
+    assert "listed twice" in faults
+    assert f"sample {held_out} is held out" in faults
+
+
+def test_a_truncated_shard_is_named(folder):
+    path = folder / "simulations" / "0.nc"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert any("0.nc is cut short" in fault for fault in check(folder))
+    with pytest.raises(RaptorError, match="cut short"):
+        read_shard(path)
+
+
+def test_a_shard_of_another_configuration_is_named(made):
+    with pytest.raises(RaptorError, match="another configuration"):
+        read_shard(made / "simulations" / "0.nc", "other")
+
+
+def test_a_missing_simulation_is_named(made, tmp_path):
+    runs = read_design(made / "design" / "design.csv")
+    moulds = {r.mould: Mould(shapely.box(-9, -9, 9, 9)) for r in runs}
+    with pytest.raises(RaptorError, match=r"simulations \[4, 5\] are in no shard"):
+        build_stack(
+            tmp_path / "fields.nc", [made / "simulations" / "0.nc"], runs, moulds, 32,
+            simulation_configuration="c", configuration="d",
+        )  # fmt: skip
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_design_keeps_its_counts_and_bounds(made):
+    runs = read_design(made / "design" / "design.csv")
+    assert [sum(r.split == s for r in runs) for s in ("train", "validation", "test")] == [3, 1, 2]
+    assert sum(r.edge for r in runs) == 2
+    for run in runs:
+        run.parameters.require_sampled("design")
+        assert run.edge == (run.parameters.delta in (0.05, 0.95))
+    assert len({r.seed for r in runs}) == len({r.mould for r in runs}) == 6
+
+
+def test_a_simulation_hangs_on_its_id_alone():
+    few, many = (
+        CONFIG.design_rules().__class__(n, 1, 1, 0) for n in (4, 9)
+    )
+    a = sample_design(few, CONFIG.random_moulds(), 3)
+    b = sample_design(many, CONFIG.random_moulds(), 3)
+    assert a[1] == b[1][:4]
+    assert [(r.parameters, r.seed) for r in a[0]] == [(r.parameters, r.seed) for r in b[0][:4]]
+
+
+def test_a_spoilt_design_is_named(made, tmp_path):
+    text = (made / "design" / "design.csv").read_text()
+    for old, new, message in (
+        ("train", "trian", "line .*split is 'trian'"),
+        ("simulation,", "simulations,", "columns"),
+        ("True", "maybe", "maybe"),
+    ):
+        path = tmp_path / "design.csv"
+        path.write_text(text.replace(old, new, 1))
+        with pytest.raises(RaptorError, match=message):
+            read_design(path)
+
+
+def test_examples_are_the_distinct_images_of_train_and_validation(made):
+    stack = made / "dataset" / "fields.nc"
+    table = read_table(stack)
+    examples = augment(stack)
+    assert {table.split[e.sample] for e in examples} == {"train", "validation"}
+    assert all(sum(e.sample == row for e in examples) in (1, 2, 4, 8) for row in table.rows("train"))
+    assert {e.sample for e in examples if e.element == 0} == set(table.rows("train", "validation"))
+
+
+def test_scaling_is_of_the_training_split_and_commutes_with_d4(made):
+    stack = made / "dataset" / "fields.nc"
+    scaling = training_scaling(stack)
+    train = [s.fields for s in read_samples(stack, read_table(stack).rows("train"))]
+    scaled = np.stack([scaling.forward(fields) for fields in train])
+    assert np.abs(scaled).max() <= 1 + 1e-6
+    assert np.stack([scaling.inverse(s) for s in scaled]) == pytest.approx(np.stack(train), abs=1e-5)
+    for element in Element.all():
+        direct = scaling.forward(apply(train[0], element))
+        assert direct == pytest.approx(apply(scaling.forward(train[0]), element), abs=1e-6)
+
+
+def test_scaling_survives_json():
+    scaling = fit_scaling(-np.arange(8.0), np.arange(8.0) + 1)
+    assert Scaling.from_json(scaling.as_json()) == scaling
+
+
+def test_inputs_are_masks_and_constants_in_minus_one_to_one():
+    masks = np.eye(4, dtype=np.uint8)
+    inputs = scale_inputs(masks, 1 - masks, CellParameters(0.95, 0.1, 0.01))
+    assert inputs.shape == (5, 4, 4)
+    assert set(np.unique(inputs[:2])) == {-1, 1}
+    assert [float(c[0, 0]) for c in inputs[2:]] == pytest.approx([1, -1, -1])

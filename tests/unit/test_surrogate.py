@@ -1,0 +1,179 @@
+import numpy as np
+import pytest
+import shapely
+import torch
+
+from raptor.dataset.examples import augment, training_scaling
+from raptor.dataset.scaling import Scaling
+from raptor.dataset.stack import read_table
+from raptor.errors import RaptorError
+from raptor.fitting import Target, fit, parameters_at
+from raptor.moulds import Mould, mould_image
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.surrogate.inference import load, save
+from raptor.surrogate.losses import discriminator_loss, generator_loss
+from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
+from raptor.surrogate.training import TrainingRules, train
+
+BOX = Mould(shapely.box(-10, -5, 10, 5))
+SCALING = Scaling((0.0,) * 8, (1.0,) * 8)
+
+
+@pytest.mark.parametrize("pixels", [16, 64, 128, 256])
+def test_the_networks_take_any_power_of_two(pixels):
+    architecture = Architecture(pixels, 4)
+    inputs, fields = torch.zeros(2, 5, pixels, pixels), torch.zeros(2, 8, pixels, pixels)
+    assert Generator(architecture)(inputs).shape == fields.shape
+    if pixels >= 32:
+        assert Discriminator(architecture)(inputs, fields).shape[:2] == (2, 1)
+    with pytest.raises(RaptorError, match="power of two"):
+        Architecture(pixels + 1, 4)
+
+
+def test_the_discriminator_sees_patches_of_seventy_pixels():
+    discriminator = Discriminator(Architecture(256, 4)).eval()
+    fields = torch.zeros(1, 8, 256, 256, requires_grad=True)
+    logits = discriminator(torch.zeros(1, 5, 256, 256), fields)
+    logits[0, 0, 15, 15].backward()
+    rows = fields.grad.abs().sum(dim=(0, 1, 3)).nonzero()
+    assert int(rows.max() - rows.min()) + 1 == 70
+
+
+def test_pix2pix_of_the_published_size_has_its_54_million_weights():
+    generator = Generator(Architecture(256, 64))
+    assert sum(p.numel() for p in generator.parameters()) == pytest.approx(54.4e6, rel=0.01)
+
+
+def test_losses():
+    sure, unsure = torch.full((1, 1, 3, 3), 20.0), torch.zeros(1, 1, 3, 3)
+    fields = torch.zeros(1, 8, 4, 4)
+    loss = generator_loss(sure, fields + 0.5, fields, 100.0)
+    assert float(loss.total) == pytest.approx(50.0)
+    assert float(discriminator_loss(sure, -sure)) == pytest.approx(0, abs=1e-6)
+    assert float(discriminator_loss(unsure, unsure)) == pytest.approx(np.log(2))
+
+
+@pytest.fixture
+def training(made, tmp_path):
+    stack = made / "dataset" / "fields.nc"
+
+    def run(epochs, name, identity="a"):
+        rules = TrainingRules(4, 4, 1e-3, 0.5, 100.0, 0, 1)
+        rules = TrainingRules(**{**rules.__dict__, "epochs": epochs})
+        return train(
+            stack, augment(stack), read_table(stack).split, training_scaling(stack),
+            Architecture(32, 4, 0.5), rules, tmp_path / name, identity,
+        )  # fmt: skip
+
+    return run
+
+
+def test_training_learns_and_is_repeatable(training):
+    a, b = training(4, "a.pt"), training(4, "b.pt")
+    assert a.history["l1"].iloc[-1] < a.history["l1"].iloc[0]
+    assert all(torch.equal(a.weights[k], b.weights[k]) for k in a.weights)
+
+
+def test_training_resumed_is_training_undisturbed(training, tmp_path, monkeypatch):
+    whole = training(4, "whole.pt")
+    import raptor.surrogate.training as module
+
+    real, calls = module._train_epoch, []
+
+    def killed(*arguments):
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        calls.append(1)
+        return real(*arguments)
+
+    monkeypatch.setattr(module, "_train_epoch", killed)
+    with pytest.raises(KeyboardInterrupt):
+        training(4, "resumed.pt")
+    monkeypatch.setattr(module, "_train_epoch", real)
+    resumed = training(4, "resumed.pt")
+    columns = ["epoch", "generator_loss", "l1", "discriminator_loss", "validation_error"]
+    assert whole.history[columns].equals(resumed.history[columns])
+    assert all(torch.equal(whole.weights[k], resumed.weights[k]) for k in whole.weights)
+
+
+def test_a_checkpoint_of_another_training_or_cut_short_is_ignored(training, tmp_path):
+    training(2, "a.pt", "one")
+    again = training(2, "a.pt", "two")
+    fresh = training(2, "fresh.pt", "two")
+    (tmp_path / "a.pt").write_bytes(b"broken")
+    after = training(2, "a.pt", "two")
+    for other in (again, after):
+        assert all(torch.equal(fresh.weights[k], other.weights[k]) for k in fresh.weights)
+
+
+@pytest.fixture
+def model_folder(tmp_path):
+    architecture = Architecture(32, 4)
+    generator = initialise(Generator(architecture))
+    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, {})
+    return tmp_path / "model"
+
+
+def test_a_saved_model_predicts_the_same(model_folder):
+    image = mould_image(BOX, 32)
+    surrogate, again = load(model_folder), load(model_folder)
+    parameters = [CellParameters(d, 0.5, 0.3) for d in (0.1, 0.9)]
+    a = surrogate.predict(image.depression, image.tethers, parameters)
+    assert a.shape == (2, 8, 32, 32)
+    assert np.array_equal(a, again.predict(image.depression, image.tethers, parameters))
+    assert not np.array_equal(a[0], a[1])
+
+
+def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
+    surrogate = load(model_folder)
+    masks = np.zeros((32, 32), bool)
+    for parameters, message in (
+        (CellParameters(0.99, 0.5, 0.3), "delta is 0.99; it must lie between 0.05 and 0.95"),
+        (CellParameters(0.5, 0.2, 0.3), "kappa_nnnn is 0.3, above kappa_nnn"),
+    ):
+        with pytest.raises(RaptorError, match=message):
+            surrogate.predict(masks, masks, [parameters])
+    with pytest.raises(RaptorError, match="takes 32 x 32"):
+        surrogate.predict(masks[1:], masks[1:], [])
+    text = (model_folder / "model.json").read_text()
+    (model_folder / "model.json").write_text(text.replace('"base_channels": 4', '"base_channels": 8'))
+    with pytest.raises(RaptorError, match="does not fit the model"):
+        load(model_folder)
+    (model_folder / "weights.safetensors").write_bytes(b"short")
+    with pytest.raises(RaptorError, match="cannot be read"):
+        load(model_folder)
+    (model_folder / "model.json").write_text("{}")
+    with pytest.raises(RaptorError, match=r"model.json cannot be read"):
+        load(model_folder)
+
+
+def test_the_unit_cube_is_the_papers_region():
+    for unit in np.random.default_rng(0).random((200, 3)):
+        parameters_at(unit).require_sampled("fit")
+    low, high = parameters_at(np.zeros(3)), parameters_at(np.ones(3))
+    assert (low.delta, low.kappa_nnn, low.kappa_nnnn) == (DELTA.lower, KAPPA_NNN.lower, KAPPA_NNNN.lower)
+    assert (high.delta, high.kappa_nnn, high.kappa_nnnn) == (DELTA.upper, KAPPA_NNN.upper, KAPPA_NNNN.upper)
+
+
+def smooth(parameters):
+    """A stand-in for a tissue: both ratios fall with delta, each with a stiffness of its own."""
+    return np.array(
+        [(1 - 0.6 * p.delta * (1 - 0.5 * p.kappa_nnn), 1 - 0.8 * p.delta * (1 - 0.3 * p.kappa_nnnn)) for p in parameters]
+    )
+
+
+def test_a_fit_finds_a_tissue_and_says_what_is_not_determined():
+    truth = CellParameters(0.6, 0.4, 0.2)
+    area, width = smooth([truth])[0]
+    fitted = fit(smooth, Target(area, width), starts=32, seed=0)
+    assert fitted.rss < 1e-8
+    assert (fitted.area_ratio, fitted.width_ratio) == pytest.approx((area, width), abs=1e-3)
+    assert fitted.rank == 2  # two numbers, three parameters
+    assert fitted.standard_error is None
+    fitted.parameters.require_sampled("fit")
+
+
+def test_a_fit_without_area_uses_the_width_alone():
+    fitted = fit(smooth, Target(None, 0.7), starts=32, seed=0)
+    assert fitted.width_ratio == pytest.approx(0.7, abs=1e-3)
+    assert fitted.rank == 1

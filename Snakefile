@@ -35,6 +35,7 @@ localrules:
 
 
 rule all:
+    default_target: True
     """Everything: data set, surrogate, evaluation, fits, trade-off, figures."""
     input:
         rules.dataset.input,
@@ -43,7 +44,6 @@ rule all:
         rules.fit.input,
         rules.tradeoff.input,
         rules.figures.input,
-    default_target: True
 
 
 rule report:

@@ -10,7 +10,6 @@ from raptor.parameters import CellParameters, NetworkModel
 from tests.small import build
 
 
-
 @pytest.fixture(scope="session")
 def made(tmp_path_factory):
     """A results folder; read it, do not change it."""

@@ -12,7 +12,12 @@ CONFIG = Configuration.model_validate(
     {
         "name": "unit",
         "design": {"simulations": 6, "test": 2, "validation": 1, "edge": 2},
-        "moulds": {"cells": [60, 250], "tethers": [0, 3], "tether_radius": [0.6, 0.8], "arm_width": 3.0},
+        "moulds": {
+            "cells": [60, 250],
+            "tethers": [0, 3],
+            "tether_radius": [0.6, 0.8],
+            "arm_width": 3.0,
+        },
         "model": {"layers": 2},
         "fields": {"pixels": 32},
     }

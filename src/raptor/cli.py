@@ -90,7 +90,9 @@ def predict(
 
 
 @app.command()
-def check(path: Annotated[Path, typer.Argument(help="results folder, shard or field stack")]) -> None:
+def check(
+    path: Annotated[Path, typer.Argument(help="results folder, shard or field stack")],
+) -> None:
     """Hold a data set, a shard or a field stack against its rules; name every fault."""
     from raptor.dataset.checks import check as find_faults
 

@@ -23,7 +23,7 @@ def source_hash() -> str:
 # named by the hash of all kernel sources cannot be stale.
 if "NUMBA_CACHE_DIR" not in os.environ:
     _base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    numba.config.CACHE_DIR = str(_base / "raptor" / "kernels" / source_hash())
+    numba.config.CACHE_DIR = str(_base / "raptor" / "kernels" / source_hash())  # type: ignore[attr-defined]
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

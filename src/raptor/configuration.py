@@ -42,7 +42,8 @@ class Design(Block):
         (DELTA.lower, DELTA.upper), description="range of the cell-matrix interaction, half open"
     )
     kappa_nnn: tuple[float, float] = Field(
-        (KAPPA_NNN.lower, KAPPA_NNN.upper), description="range of the second spring constant, in kappa0"
+        (KAPPA_NNN.lower, KAPPA_NNN.upper),
+        description="range of the second spring constant, in kappa0",
     )
     kappa_nnnn: tuple[float, float] = Field(
         (KAPPA_NNNN.lower, KAPPA_NNNN.upper),
@@ -365,7 +366,9 @@ def write_reference(root: Path) -> list[Path]:
     contents = {
         "workflow/schemas/config.schema.json": json.dumps(json_schema(), indent=1) + "\n",
         "config/laptop.yaml": DEFAULTS_HEAD
-        + yaml.safe_dump(Configuration().model_dump(mode="json"), sort_keys=False, default_flow_style=None),
+        + yaml.safe_dump(
+            Configuration().model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=100
+        ),
         "config/README.md": README_HEAD + key_table(),
     }
     for name, content in contents.items():
@@ -374,7 +377,7 @@ def write_reference(root: Path) -> list[Path]:
     return [root / name for name in contents]
 
 
-DEFAULTS_HEAD = """# The default configuration: 64 simulations, a surrogate and a fit in about ten minutes on two cores.
+DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about ten minutes on two cores.
 # Every key is explained in config/README.md. Written by `raptor reference`.
 """
 README_HEAD = """# Configuration

@@ -23,7 +23,9 @@ from raptor.symmetry import FIELDS, Element
 MEASURES = (*BULK, "area_ratio", "width_ratio")
 
 
-def sample_measures(fields: NDArray[np.floating], sample: Sample, mould: Mould, layers: int) -> dict[str, float]:
+def sample_measures(
+    fields: NDArray[np.floating], sample: Sample, mould: Mould, layers: int
+) -> dict[str, float]:
     """Bulk statistics, A/A0 and w/w0 of fields (8, y, x) on a sample's mould, keyed by `MEASURES`."""
     threshold = density_threshold(layers, fields.shape[-1])
     image = MouldImage(sample.depression.astype(bool), sample.tethers.astype(bool))
@@ -37,7 +39,7 @@ def training_mean(stack: Path, examples: list[Example]) -> NDArray[np.float64]:
     """Mean fields (8, y, x) of the augmented training examples: what a guess without inputs gives."""
     splits = read_table(stack).split
     chosen = [example for example in examples if splits[example.sample] == "train"]
-    total: NDArray[np.float64] | float = 0.0
+    total = np.zeros(())
     for example in chosen:
         (sample,) = read_samples(stack, [example.sample])
         total = total + transform_sample(sample, Element.from_index(example.element)).fields
@@ -111,7 +113,13 @@ def _agreement(metrics: pd.DataFrame, name: str) -> dict[str, float]:
     """Predicted against simulated; cases without the measure (no material there) are counted."""
     pair = metrics[[f"{name}_simulated", f"{name}_predicted"]].dropna().to_numpy()
     if len(pair) < 2:
-        return {"samples": len(pair), "pearson": np.nan, "slope": np.nan, "rmse": np.nan, "mae": np.nan}
+        return {
+            "samples": len(pair),
+            "pearson": np.nan,
+            "slope": np.nan,
+            "rmse": np.nan,
+            "mae": np.nan,
+        }
     simulated, predicted = pair.T
     spread = float(((simulated - simulated.mean()) ** 2).sum())
     covariance = float(((simulated - simulated.mean()) * (predicted - predicted.mean())).sum())

@@ -22,12 +22,12 @@ REACH = 6.0  # in sigma: beyond it lies 2e-9 of a cell
 
 
 @kernel
-def _weights_kernel(position, pixels, size, weights):  # type: ignore[no-untyped-def]
+def _weights_kernel(position, pixels, size, weights):
     """Integrals of a one-dimensional Gaussian over pixels; returns the first pixel and how many."""
     scale = 1.0 / (SIGMA * math.sqrt(2.0))
     edge = -0.5 * IMAGE_SIZE
-    first = max(0, int(math.floor((position - REACH * SIGMA - edge) / size)))
-    last = min(pixels - 1, int(math.floor((position + REACH * SIGMA - edge) / size)))
+    first = max(0, math.floor((position - REACH * SIGMA - edge) / size))
+    last = min(pixels - 1, math.floor((position + REACH * SIGMA - edge) / size))
     below = math.erf((edge + first * size - position) * scale)
     for pixel in range(first, last + 1):
         above = math.erf((edge + (pixel + 1) * size - position) * scale)
@@ -37,7 +37,7 @@ def _weights_kernel(position, pixels, size, weights):  # type: ignore[no-untyped
 
 
 @kernel
-def _rasterise_kernel(x, y, values, size, image):  # type: ignore[no-untyped-def]
+def _rasterise_kernel(x, y, values, size, image):
     """Add every cell's channels (cells, channels) to the image (channels, pixels, pixels)."""
     channels, pixels, _ = image.shape
     wx = np.empty(pixels)
@@ -103,4 +103,4 @@ def rasterise(
 
 def normalised(fields: NDArray[np.floating], cells: int) -> NDArray[np.floating]:
     """Zbar_p = (N_p / N_c) Z_p, whose mean over pixels is the mean over cells (paper, eq. 5)."""
-    return fields * (fields.shape[-1] * fields.shape[-2] / cells)
+    return np.asarray(fields * (fields.shape[-1] * fields.shape[-2] / cells))

@@ -137,7 +137,7 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
             residuals,
             points[start],
             bounds=(-BOUND_MARGIN, 1 + BOUND_MARGIN),
-            diff_step=STEP,
+            diff_step=[STEP] * 3,
             x_scale=0.3,
             max_nfev=30,
         )
@@ -146,7 +146,7 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
     best = min(refined, key=lambda result: float(result.cost))
     parameters = parameters_at(best.x)
     area, width = (float(v) for v in measure([parameters])[0])
-    rank, errors = _covariance(best.jac, best.x, 2 * float(best.cost))
+    rank, errors = _covariance(np.asarray(best.jac), best.x, 2 * float(best.cost))
     return Fit(parameters, area, width, 2 * float(best.cost), errors, rank, count)
 
 
@@ -159,9 +159,13 @@ def _covariance(
         return rank, None
     covariance = np.linalg.inv(jacobian.T @ jacobian) * rss / (len(jacobian) - 3)
     base = np.array(list(asdict(parameters_at(unit)).values()))
-    slopes = np.stack(
-        [np.array(list(asdict(parameters_at(unit + STEP * e)).values())) - base for e in np.eye(3)], 1
-    ) / STEP
+    slopes = (
+        np.stack(
+            [np.array(list(asdict(parameters_at(unit + STEP * e)).values())) - base for e in np.eye(3)],
+            1,
+        )
+        / STEP
+    )
     return rank, tuple(float(v) for v in np.sqrt(np.diag(slopes @ covariance @ slopes.T)))
 
 

@@ -49,9 +49,7 @@ def field_pearson(prediction: NDArray[np.floating], target: NDArray[np.floating]
     return [pearson(p.ravel(), t.ravel()) for p, t in zip(prediction, target, strict=True)]
 
 
-def bulk_statistics(
-    fields: NDArray[np.floating], cells: int, threshold: float
-) -> dict[str, float]:
+def bulk_statistics(fields: NDArray[np.floating], cells: int, threshold: float) -> dict[str, float]:
     """The paper's eight bulk statistics of one sample (fields, y, x), keyed by `BULK`.
 
     Parameters
@@ -62,9 +60,7 @@ def bulk_statistics(
         Density per pixel above which there is tissue.
     """
     means = dict(zip(FIELDS, fields.mean(axis=(-2, -1), dtype=np.float64), strict=True))
-    bars = dict(
-        zip(FIELDS, normalised(fields, cells).mean(axis=(-2, -1), dtype=np.float64), strict=True)
-    )
+    bars = dict(zip(FIELDS, normalised(fields, cells).mean(axis=(-2, -1), dtype=np.float64), strict=True))
     return {
         "P": float(means["density"]),
         "N": float(np.count_nonzero(fields[0] > threshold)),

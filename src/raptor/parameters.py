@@ -72,7 +72,11 @@ class CellParameters:
         RaptorError
             Where a parameter lies outside the box that sampling, prediction and fitting keep to.
         """
-        for name, bounds in (("delta", DELTA), ("kappa_nnn", KAPPA_NNN), ("kappa_nnnn", KAPPA_NNNN)):
+        for name, bounds in (
+            ("delta", DELTA),
+            ("kappa_nnn", KAPPA_NNN),
+            ("kappa_nnnn", KAPPA_NNNN),
+        ):
             value = getattr(self, name)
             if not bounds.lower <= value <= bounds.upper:
                 raise RaptorError(

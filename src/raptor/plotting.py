@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -29,7 +29,7 @@ BULK_LABELS = {
     "Tbar": r"mean $\bar{T}$", "SxSx": "mean $S_x S_x$", "SxSxbar": r"mean $\overline{S_x S_x}$",
     "SySy": "mean $S_y S_y$", "SySybar": r"mean $\overline{S_y S_y}$",
 }  # fmt: skip
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.hashsalt": "raptor", "svg.fonttype": "none", "font.size": 9, "axes.titlesize": 9,
     "axes.spines.top": False, "axes.spines.right": False, "figure.dpi": 120, "savefig.dpi": 150,
 }  # fmt: skip
@@ -54,7 +54,13 @@ def draw_mould(axes: Axes, mould: Mould, *, fill: bool = True) -> None:
     """Outline of a depression, and its tethers, in l0."""
     outline = np.asarray(mould.outline.exterior.coords)
     axes.add_patch(
-        Polygon(outline, closed=True, facecolor="#e9e4d4" if fill else "none", edgecolor="#444444", lw=0.8)
+        Polygon(
+            outline,
+            closed=True,
+            facecolor="#e9e4d4" if fill else "none",
+            edgecolor="#444444",
+            lw=0.8,
+        )
     )
     for tether in mould.tethers:
         corners = np.asarray(tether.polygon.exterior.coords)
@@ -81,7 +87,7 @@ def show_field(axes: Axes, image: NDArray[np.floating], field: str, limit: float
 def fields_figure(simulated: NDArray[np.floating], predicted: NDArray[np.floating], mould: Mould) -> Figure:
     """The paper's first figure: a mould, and its eight fields (8, y, x) simulated and predicted."""
     figure = new_figure(11.0, 6.4)
-    left, right = figure.subfigures(1, 2, width_ratios=[1, 5.2])
+    left, right = cast(Any, figure.subfigures(1, 2, width_ratios=[1, 5.2]))
     axes = left.add_subplot()
     draw_mould(axes, mould)
     axes.set_title(f"mould {mould.name}\n(image {IMAGE_SIZE:g} $l_0$ wide)")
@@ -128,7 +134,7 @@ def training_figure(history: pd.DataFrame) -> Figure:
     losses.set(xlabel="epoch", ylabel="loss", yscale="log")
     losses.legend(frameon=False)
     error.plot(history["epoch"], history["validation_error"], color=SIMULATED)
-    best = history.loc[history["validation_error"].idxmin()]
+    best = history.iloc[int(history["validation_error"].argmin())]
     error.plot(best["epoch"], best["validation_error"], "o", color=PREDICTED)
     error.set_title(f"weights kept: epoch {best['epoch']:.0f}, {best['validation_error']:.3f}")
     error.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))
@@ -138,7 +144,7 @@ def training_figure(history: pd.DataFrame) -> Figure:
 def design_figure(design: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
     """Distributions of the parameters and of the moulds, and a few moulds drawn."""
     figure = new_figure(11.0, 6.0)
-    top, bottom = figure.subfigures(2, 1, height_ratios=[1.2, 1])
+    top, bottom = cast(Any, figure.subfigures(2, 1, height_ratios=[1.2, 1]))
     panels = top.subplots(1, 4)
     panels[0].hist(design["delta"], bins=18, range=(0.05, 0.95), color=SIMULATED)
     panels[0].set(xlabel=r"$\Delta$", ylabel="simulations")
@@ -168,7 +174,12 @@ def fit_figure(
     for axes, (name, density) in zip(panels, densities.items(), strict=False):
         shown = show_field(axes, density, "density", limit)
         axes.contour(
-            density, [threshold], origin="lower", extent=(-HALF, HALF, -HALF, HALF), colors="white", linewidths=0.8
+            density,
+            [threshold],
+            origin="lower",
+            extent=(-HALF, HALF, -HALF, HALF),
+            colors="white",
+            linewidths=0.8,
         )
         draw_mould(axes, mould, fill=False)
         axes.set_title(name)

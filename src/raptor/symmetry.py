@@ -5,6 +5,7 @@ Element = mirror x -> -x first where `mirror`, then counter-clockwise quarter tu
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class Element:
         return matrix
 
 
-def move_pixels(image: NDArray[np.generic], element: Element) -> NDArray[np.generic]:
+def move_pixels(image: NDArray[Any], element: Element) -> NDArray[Any]:
     """Move the pixels of a square image (..., y, x), rows ascending in y; values unchanged."""
     if element.mirror:
         image = image[..., ::-1]

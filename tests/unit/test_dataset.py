@@ -20,6 +20,7 @@ from raptor.parameters import CellParameters
 from raptor.symmetry import Element, apply
 from tests.small import CONFIG, build
 
+
 @pytest.fixture
 def folder(made, tmp_path):
     """A copy to spoil."""
@@ -138,9 +139,7 @@ def test_the_design_keeps_its_counts_and_bounds(made):
 
 
 def test_a_simulation_hangs_on_its_id_alone():
-    few, many = (
-        CONFIG.design_rules().__class__(n, 1, 1, 0) for n in (4, 9)
-    )
+    few, many = (CONFIG.design_rules().__class__(n, 1, 1, 0) for n in (4, 9))
     a = sample_design(few, CONFIG.random_moulds(), 3)
     b = sample_design(many, CONFIG.random_moulds(), 3)
     assert a[1] == b[1][:4]

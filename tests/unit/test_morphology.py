@@ -11,6 +11,7 @@ X, Y = np.meshgrid(pixel_centres(256), pixel_centres(256))
 
 def smooth_box(half_x, half_y):
     """A density that crosses 1/2 exactly at the edges of a box."""
+
     def edge(u, half):
         return 1 / (1 + np.exp(np.clip((np.abs(u) - half) / 0.3, -50, 50)))
 

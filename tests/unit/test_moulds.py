@@ -7,7 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raptor.errors import RaptorError
-from raptor.moulds import Circle, Mould, PolygonTether, mould_image, read_mould, read_moulds, write_moulds
+from raptor.moulds import (
+    Circle,
+    Mould,
+    PolygonTether,
+    mould_image,
+    read_mould,
+    read_moulds,
+    write_moulds,
+)
 from raptor.moulds.random_moulds import GROUPS, RandomMoulds
 from raptor.moulds.standard import STANDARD
 from raptor.symmetry import Element
@@ -89,7 +97,11 @@ def test_forbidden_depth_is_signed():
         ({"type": "MultiPolygon", "coordinates": [[], []]}, {}, "in 2 pieces"),
         ({"type": "Point", "coordinates": [0, 0]}, {}, "a Polygon is expected"),
         (SQUARE, {"tethers": [{"x": 0, "y": 0, "radius": 8}]}, "reaches out of the depression"),
-        (SQUARE, {"tethers": [{"polygon": [[-5, -5], [5, -5], [5, 5], [-5, 5]]}]}, "cover the depression"),
+        (
+            SQUARE,
+            {"tethers": [{"polygon": [[-5, -5], [5, -5], [5, 5], [-5, 5]]}]},
+            "cover the depression",
+        ),
         (SQUARE, {"tethers": [{"x": 0, "y": 0, "radius": -1}]}, "must be positive"),
         (SQUARE, {"tethers": [{"x": 0, "r": 1}]}, 'must be {"x", "y", "radius"}'),
         (SQUARE, {"tethers": [{"polygon": [[0, 0], [1]]}]}, "not a list of"),

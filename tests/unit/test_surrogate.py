@@ -151,14 +151,28 @@ def test_the_unit_cube_is_the_papers_region():
     for unit in np.random.default_rng(0).random((200, 3)):
         parameters_at(unit).require_sampled("fit")
     low, high = parameters_at(np.zeros(3)), parameters_at(np.ones(3))
-    assert (low.delta, low.kappa_nnn, low.kappa_nnnn) == (DELTA.lower, KAPPA_NNN.lower, KAPPA_NNNN.lower)
-    assert (high.delta, high.kappa_nnn, high.kappa_nnnn) == (DELTA.upper, KAPPA_NNN.upper, KAPPA_NNNN.upper)
+    assert (low.delta, low.kappa_nnn, low.kappa_nnnn) == (
+        DELTA.lower,
+        KAPPA_NNN.lower,
+        KAPPA_NNNN.lower,
+    )
+    assert (high.delta, high.kappa_nnn, high.kappa_nnnn) == (
+        DELTA.upper,
+        KAPPA_NNN.upper,
+        KAPPA_NNNN.upper,
+    )
 
 
 def smooth(parameters):
     """A stand-in for a tissue: both ratios fall with delta, each with a stiffness of its own."""
     return np.array(
-        [(1 - 0.6 * p.delta * (1 - 0.5 * p.kappa_nnn), 1 - 0.8 * p.delta * (1 - 0.3 * p.kappa_nnnn)) for p in parameters]
+        [
+            (
+                1 - 0.6 * p.delta * (1 - 0.5 * p.kappa_nnn),
+                1 - 0.8 * p.delta * (1 - 0.3 * p.kappa_nnnn),
+            )
+            for p in parameters
+        ]
     )
 
 

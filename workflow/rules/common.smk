@@ -11,7 +11,9 @@ from raptor.errors import RaptorError
 
 try:
     CONFIG = configuration.parse(config, "configuration")
-    TISSUES = configuration.load_tissues(Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues)
+    TISSUES = configuration.load_tissues(
+        Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues
+    )
 except RaptorError as error:
     raise WorkflowError(str(error))
 
@@ -42,10 +44,10 @@ rule record_configuration:
         f"{RESULTS}/logs/record_configuration.log",
     benchmark:
         f"{RESULTS}/benchmarks/record_configuration.tsv"
-    params:
-        configuration=CONFIG.model_dump(mode="json"),
     threads: 1
     resources:
         mem_mb=200,
+    params:
+        configuration=CONFIG.model_dump(mode="json"),
     script:
         "../scripts/record_configuration.py"

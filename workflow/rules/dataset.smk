@@ -13,14 +13,14 @@ rule build_stack:
         f"{RESULTS}/logs/build_stack.log",
     benchmark:
         f"{RESULTS}/benchmarks/build_stack.tsv"
+    retries: 1
+    threads: 1
+    resources:
+        mem_mb=1500,
     params:
         pixels=CONFIG.fields.pixels,
         simulation_configuration=CONFIG.fingerprint("simulation"),
         configuration=CONFIG.fingerprint("dataset"),
-    threads: 1
-    resources:
-        mem_mb=1500,
-    retries: 1
     script:
         "../scripts/build_stack.py"
 
@@ -32,17 +32,19 @@ rule augment_dataset:
     output:
         examples=f"{RESULTS}/dataset/examples.csv",
         normalisation=f"{RESULTS}/dataset/normalisation.json",
-        augmented=([f"{RESULTS}/dataset/augmented.nc"] if CONFIG.dataset.materialise else []),
+        augmented=(
+            [f"{RESULTS}/dataset/augmented.nc"] if CONFIG.dataset.materialise else []
+        ),
     log:
         f"{RESULTS}/logs/augment_dataset.log",
     benchmark:
         f"{RESULTS}/benchmarks/augment_dataset.tsv"
-    params:
-        configuration=CONFIG.fingerprint("dataset"),
+    retries: 1
     threads: 1
     resources:
         mem_mb=1000,
-    retries: 1
+    params:
+        configuration=CONFIG.fingerprint("dataset"),
     script:
         "../scripts/augment_dataset.py"
 
@@ -62,11 +64,11 @@ rule check_dataset:
         f"{RESULTS}/logs/check_dataset.log",
     benchmark:
         f"{RESULTS}/benchmarks/check_dataset.tsv"
-    params:
-        folder=lambda wildcards, input: str(Path(input.stack).parents[1]),
     threads: 1
     resources:
         mem_mb=1500,
+    params:
+        folder=lambda wildcards, input: str(Path(input.stack).parents[1]),
     script:
         "../scripts/check_dataset.py"
 
@@ -89,11 +91,11 @@ rule write_card:
         f"{RESULTS}/logs/write_card.log",
     benchmark:
         f"{RESULTS}/benchmarks/write_card.tsv"
-    params:
-        name=CONFIG.name,
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        name=CONFIG.name,
     script:
         "../scripts/write_card.py"
 

@@ -14,11 +14,11 @@ rule sample_design:
         f"{RESULTS}/logs/sample_design.log",
     benchmark:
         f"{RESULTS}/benchmarks/sample_design.tsv"
-    params:
-        configuration=CONFIG.fingerprint("design"),
-        dump=CONFIG.model_dump(mode="json"),
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        configuration=CONFIG.fingerprint("design"),
+        dump=CONFIG.model_dump(mode="json"),
     script:
         "../scripts/sample_design.py"

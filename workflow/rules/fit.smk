@@ -20,6 +20,9 @@ rule fit_tissue:
         f"{RESULTS}/logs/fit_tissue/{{tissue}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/fit_tissue/{{tissue}}.tsv"
+    threads: CONFIG.surrogate.threads
+    resources:
+        mem_mb=2000,
     params:
         tissue=lambda wildcards: TISSUES[wildcards.tissue].model_dump(mode="json"),
         mould_scale=CONFIG.fit.mould_scale,
@@ -28,9 +31,6 @@ rule fit_tissue:
         model=CONFIG.model.model_dump(mode="json"),
         accuracy=CONFIG.simulation.accuracy,
         configuration=CONFIG.fingerprint("surrogate"),
-    threads: CONFIG.surrogate.threads
-    resources:
-        mem_mb=2000,
     script:
         "../scripts/fit_tissue.py"
 

@@ -9,12 +9,12 @@ rule compile_kernels:
         f"{RESULTS}/logs/compile_kernels.log",
     benchmark:
         f"{RESULTS}/benchmarks/compile_kernels.tsv"
-    params:
-        sources=source_hash(),
+    retries: 1
     threads: 1
     resources:
         mem_mb=1000,
-    retries: 1
+    params:
+        sources=source_hash(),
     script:
         "../scripts/compile_kernels.py"
 
@@ -31,15 +31,15 @@ rule simulate_shard:
         f"{RESULTS}/logs/simulate_shard/{{shard}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate_shard/{{shard}}.tsv"
+    retries: 2
+    threads: 1
+    resources:
+        mem_mb=lambda wildcards, attempt: 1000 * attempt,
     params:
         configuration=CONFIG.fingerprint("simulation"),
         layers=CONFIG.model.layers,
         shells=CONFIG.model.shells,
         tension=CONFIG.model.tension,
         accuracy=CONFIG.simulation.accuracy,
-    threads: 1
-    resources:
-        mem_mb=lambda wildcards, attempt: 1000 * attempt,
-    retries: 2
     script:
         "../scripts/simulate_shard.py"

@@ -20,16 +20,16 @@ rule train_surrogate:
         f"{RESULTS}/logs/train_surrogate.log",
     benchmark:
         f"{RESULTS}/benchmarks/train_surrogate.tsv"
+    retries: 1
+    threads: CONFIG.surrogate.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
     params:
         identity=CONFIG.fingerprint("surrogate"),
         surrogate=CONFIG.surrogate.model_dump(mode="json"),
         seed=CONFIG.seed,
         layers=CONFIG.model.layers,
         checkpoint=lambda wildcards, output: f"{Path(output.weights).parent}/checkpoint.pt",
-    threads: CONFIG.surrogate.threads
-    resources:
-        mem_mb=lambda wildcards, attempt: 4000 * attempt,
-    retries: 1
     script:
         "../scripts/train_surrogate.py"
 

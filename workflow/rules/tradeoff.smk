@@ -19,13 +19,13 @@ rule measure_tradeoff:
         f"{RESULTS}/logs/measure_tradeoff.log",
     benchmark:
         f"{RESULTS}/benchmarks/measure_tradeoff.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
     params:
         model=CONFIG.model.model_dump(mode="json"),
         tradeoff=CONFIG.tradeoff.model_dump(mode="json"),
         model_version=MODEL_VERSION,
-    threads: 1
-    resources:
-        mem_mb=2000,
     script:
         "../scripts/measure_tradeoff.py"
 

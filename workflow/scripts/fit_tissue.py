@@ -27,7 +27,12 @@ with logged(snakemake.log[0]):
     measured = measure_simulation(simulation, mould, model, surrogate.architecture.pixels, target)
     run = Run(0, mould.name, "test", False, fitted.parameters, seed)
     write_shard(
-        Path(snakemake.output.tissue), [run], [simulation], model, params.accuracy, params.configuration
+        Path(snakemake.output.tissue),
+        [run],
+        [simulation],
+        model,
+        params.accuracy,
+        params.configuration,
     )
     content = {
         "tissue": snakemake.wildcards.tissue,

@@ -26,5 +26,10 @@ with logged(snakemake.log[0]):
             ),
         )
     write_shard(
-        Path(snakemake.output.shard), runs, simulations, model, params.accuracy, params.configuration
+        Path(snakemake.output.shard),
+        runs,
+        simulations,
+        model,
+        params.accuracy,
+        params.configuration,
     )

@@ -14,9 +14,7 @@ with logged(snakemake.log[0]):
     given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
     table = read_table(stack)
     scaling = read_scaling(Path(snakemake.input.normalisation))
-    architecture = Architecture(
-        table.pixels, given["base_channels"], given["dropout"], given["patch_layers"]
-    )
+    architecture = Architecture(table.pixels, given["base_channels"], given["dropout"], given["patch_layers"])
     names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1")
     rules = TrainingRules(
         **{name: given[name] for name in names},

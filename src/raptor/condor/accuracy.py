@@ -128,9 +128,7 @@ def simulate(
     """
     if isinstance(accuracy, str):
         if accuracy not in ACCURACIES:
-            raise RaptorError(
-                f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}"
-            )
+            raise RaptorError(f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}")
         accuracy = ACCURACIES[accuracy]
     started = time.perf_counter()
     rng = np.random.default_rng(seed)
@@ -165,9 +163,7 @@ def cast_state(lattice: Lattice, rng: Generator) -> NDArray[np.float64]:
     return np.concatenate([lattice.sites.T.ravel(), orientation.ravel()])
 
 
-def _undrifted(
-    state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould
-) -> NDArray[np.float64]:
+def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
     """The state moved and turned in the plane as a whole, so that it lies as it was cast.
 
     Nothing holds a gel without tethers: moved or turned with its cells it has the same energy.

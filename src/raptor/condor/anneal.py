@@ -34,7 +34,7 @@ class Annealed(NamedTuple):
 
 
 @kernel
-def _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta):  # type: ignore[no-untyped-def]
+def _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta):
     """Energy of one cell's bonds and walls, were it at (x, y, z) with orientation (sx, sy, sz)."""
     cells = state.size // 6
     energy = wall_energy(x, y, z, walls)[0]
@@ -46,15 +46,13 @@ def _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta):  
         along_second = (
             lx * state[3 * cells + j] + ly * state[4 * cells + j] + lz * state[5 * cells + j]
         ) / length
-        natural = natural_length_kernel(
-            network.neighbour_rest[entry], delta, along_first, along_second
-        )
+        natural = natural_length_kernel(network.neighbour_rest[entry], delta, along_first, along_second)
         energy += 0.5 * network.neighbour_stiffness[entry] * (length - natural) ** 2
     return energy
 
 
 @kernel
-def _sweep_kernel(state, network, walls, delta, temperature, step, turn, rng):  # type: ignore[no-untyped-def]
+def _sweep_kernel(state, network, walls, delta, temperature, step, turn, rng):
     """Try every cell once; returns the number of accepted trial moves."""
     cells = state.size // 6
     accepted = 0
@@ -79,7 +77,7 @@ def _sweep_kernel(state, network, walls, delta, temperature, step, turn, rng):  
 
 
 @kernel
-def _anneal_kernel(state, network, walls, delta, initial, factor, sweeps, rng):  # type: ignore[no-untyped-def]
+def _anneal_kernel(state, network, walls, delta, initial, factor, sweeps, rng):
     """Cool geometrically over the sweeps; returns the acceptance rate of the last tenth."""
     cells = state.size // 6
     size = 1.0

@@ -56,7 +56,5 @@ def contract(
         )
         state = minimum.state
         used += minimum.evaluations
-    minimum = minimise(
-        state, network, walls, delta, tolerance=contraction.tolerance, limit=contraction.limit
-    )
+    minimum = minimise(state, network, walls, delta, tolerance=contraction.tolerance, limit=contraction.limit)
     return minimum._replace(evaluations=used + minimum.evaluations)

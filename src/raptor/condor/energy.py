@@ -26,7 +26,7 @@ ROWS = 21  # of a block's buffer: 12 read, 9 written
 BUFFER = ROWS * WIDTH
 
 
-def natural_length(rest_length, delta, along_first, along_second):  # type: ignore[no-untyped-def]
+def natural_length(rest_length, delta, along_first, along_second):
     """L': length at which a bond is at rest, given u.s_i and u.s_j (paper, equation 2), l0."""
     return rest_length * (1 - delta / 2 * (2 - along_first**2 - along_second**2))
 
@@ -35,7 +35,7 @@ natural_length_kernel = kernel(natural_length)
 
 
 @kernel
-def _block_kernel(b, stiffness, rest, delta):  # type: ignore[no-untyped-def]
+def _block_kernel(b, stiffness, rest, delta):
     """Energy of the WIDTH bonds in a buffer; writes their forces into it.
 
     Rows of b: positions and orientations of the first cells (0 to 5) and the second (6 to 11);
@@ -82,7 +82,7 @@ def _block_kernel(b, stiffness, rest, delta):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _copy_kernel(state, cells, network, block, b):  # type: ignore[no-untyped-def]
+def _copy_kernel(state, cells, network, block, b):
     """Copy both ends of a block's bonds into its buffer."""
     for c in range(CHUNKS):
         first = network.chunk_first[block * CHUNKS + c]
@@ -93,7 +93,7 @@ def _copy_kernel(state, cells, network, block, b):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _add_kernel(gradient, cells, network, block, b):  # type: ignore[no-untyped-def]
+def _add_kernel(gradient, cells, network, block, b):
     """Add a block's forces to the gradient of both ends of its bonds."""
     for c in range(CHUNKS):
         first = network.chunk_first[block * CHUNKS + c]
@@ -107,7 +107,7 @@ def _add_kernel(gradient, cells, network, block, b):  # type: ignore[no-untyped-
 
 
 @kernel
-def _objective_kernel(state, gradient, network, walls, delta, unit, force, buffer):  # type: ignore[no-untyped-def]
+def _objective_kernel(state, gradient, network, walls, delta, unit, force, buffer):
     """Bond energy and wall energy of a state; fills its gradient.
 
     `unit` and `force` are scratch, LANES longer than the state: lanes without a bond read and add
@@ -149,7 +149,7 @@ def _objective_kernel(state, gradient, network, walls, delta, unit, force, buffe
 
 
 @kernel
-def _stretch_kernel(state, first, second, stiffness, rest, delta, hooke, tension):  # type: ignore[no-untyped-def]
+def _stretch_kernel(state, first, second, stiffness, rest, delta, hooke, tension):
     """Sum over each cell's bonds of the tension, for unit orientations."""
     cells = tension.size
     for bond in range(first.size):

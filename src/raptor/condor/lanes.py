@@ -37,9 +37,9 @@ def _as_instruction(move: Callable[..., None], operation: str | None) -> None:
     """Give a move its compiled form: load, at most one arithmetic operation, store."""
 
     @intrinsic
-    def instruction(context, target, i, source, j):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-            def pointer(array, kind, index):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    def instruction(context, target, i, source, j):
+        def generate(context, builder, signature, arguments):
+            def pointer(array, kind, index):
                 data = context.make_array(kind)(context, builder, array).data
                 element = context.get_data_type(kind.dtype)
                 place = builder.gep(data, [index])
@@ -57,8 +57,11 @@ def _as_instruction(move: Callable[..., None], operation: str | None) -> None:
         return types.none(target, i, source, j), generate
 
     @overload(move)
-    def _compiled(target, i, source, j):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-        return lambda target, i, source, j: instruction(target, np.intp(i), source, np.intp(j))
+    def _compiled(target, i, source, j):
+        def move_lanes(target, i, source, j):
+            instruction(target, np.intp(i), source, np.intp(j))  # type: ignore[call-arg]  # Numba passes the context
+
+        return move_lanes
 
 
 _as_instruction(copy_lanes, None)

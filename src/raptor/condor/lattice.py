@@ -13,7 +13,6 @@ from raptor.errors import RaptorError
 from raptor.moulds.geometry import IMAGE_SIZE, STRICTLY, Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 
-
 HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond
 
 
@@ -106,9 +105,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
     return sites
 
 
-def connect(
-    sites: NDArray[np.float64], parameters: CellParameters, model: NetworkModel
-) -> Lattice:
+def connect(sites: NDArray[np.float64], parameters: CellParameters, model: NetworkModel) -> Lattice:
     """Build the bonds between sites (cells, 3) given by layer, then y, then x, as cast."""
     index = _site_numbers(sites, model.layers)
     kappas = (1.0, parameters.kappa_nnn, parameters.kappa_nnnn)

@@ -55,7 +55,7 @@ class _Work(NamedTuple):
 
 
 @kernel
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a, b):
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
@@ -63,7 +63,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _largest(a):  # type: ignore[no-untyped-def]
+def _largest(a):
     value = 0.0
     for i in range(a.size):
         value = max(value, abs(a[i]))
@@ -71,7 +71,7 @@ def _largest(a):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _direction_kernel(work, stored, newest):  # type: ignore[no-untyped-def]
+def _direction_kernel(work, stored, newest):
     """Two-loop recursion: direction = - (inverse Hessian) gradient."""
     d = work.direction
     d[:] = work.gradient
@@ -99,7 +99,7 @@ def _direction_kernel(work, stored, newest):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search_kernel(state, total, slope, length, network, walls, delta, work):  # type: ignore[no-untyped-def]
+def _search_kernel(state, total, slope, length, network, walls, delta, work):
     """Shorten a step until the objective falls enough; returns the step and the new energies."""
     used = 0
     energy = walled = 0.0
@@ -107,7 +107,14 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):  #
         for i in range(state.size):
             work.trial[i] = state[i] + length * work.direction[i]
         energy, walled = _objective_kernel(
-            work.trial, work.trial_gradient, network, walls, delta, work.unit, work.force, work.buffer
+            work.trial,
+            work.trial_gradient,
+            network,
+            walls,
+            delta,
+            work.unit,
+            work.force,
+            work.buffer,
         )
         used += 1
         value = energy + walled
@@ -120,7 +127,7 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):  #
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, tolerance, limit, work):  # type: ignore[no-untyped-def]
+def _minimise_kernel(state, network, walls, delta, tolerance, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(
         state, work.gradient, network, walls, delta, work.unit, work.force, work.buffer
@@ -192,13 +199,19 @@ def minimise(
     if state.size != 6 * (len(network.start) - 1) or not np.isfinite(state).all():
         raise RaptorError("the state to minimise does not fit the network, or is not finite")
     state = unit_orientations(state)
-    like = (np.empty_like(state) for _ in range(4))
-    pairs = (np.zeros((MEMORY, state.size)) for _ in range(2))
-    work = _Work(*like, *pairs, np.zeros(MEMORY), *scratch(state.size // 6))
-    energy, walled, gradient, used = _minimise_kernel(
-        state, network, walls, delta, tolerance, limit, work
+    unit, force, buffer = scratch(state.size // 6)
+    work = _Work(
+        gradient=np.empty_like(state),
+        trial=np.empty_like(state),
+        trial_gradient=np.empty_like(state),
+        direction=np.empty_like(state),
+        steps=np.zeros((MEMORY, state.size)),
+        changes=np.zeros((MEMORY, state.size)),
+        curvature=np.zeros(MEMORY),
+        unit=unit,
+        force=force,
+        buffer=buffer,
     )
+    energy, walled, gradient, used = _minimise_kernel(state, network, walls, delta, tolerance, limit, work)
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
-    return Minimum(
-        unit_orientations(state), energy, walled, gradient, used, finite and gradient <= tolerance
-    )
+    return Minimum(unit_orientations(state), energy, walled, gradient, used, finite and gradient <= tolerance)

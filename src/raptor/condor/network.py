@@ -7,7 +7,7 @@ to consecutive cells. They are cut into chunks of `LANES`: bond t of a chunk joi
 instructions, and adds the forces back, each bond once. The buffer stays in the innermost cache.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def build_network(lattice: Lattice) -> Network:
     return Network(*_blocks(lattice), *_neighbours(lattice))
 
 
-def _blocks(lattice: Lattice) -> tuple[NDArray[np.generic], ...]:
+def _blocks(lattice: Lattice) -> tuple[NDArray[Any], ...]:
     """Chunks of consecutive bonds, filled up to whole blocks of one rest length."""
     parts = [
         _chunks(lattice, np.flatnonzero(lattice.rest_length == rest))
@@ -58,7 +58,7 @@ def _blocks(lattice: Lattice) -> tuple[NDArray[np.generic], ...]:
     )
 
 
-def _chunks(lattice: Lattice, bonds: NDArray[np.int64]) -> tuple[NDArray[np.generic], ...]:
+def _chunks(lattice: Lattice, bonds: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
     """First cells, second cells and lane stiffness of the chunks that hold some bonds."""
     first = lattice.first[bonds].astype(np.int64)
     second = lattice.second[bonds].astype(np.int64)
@@ -78,7 +78,7 @@ def _chunks(lattice: Lattice, bonds: NDArray[np.int64]) -> tuple[NDArray[np.gene
     return chunk_first, chunk_second, stiffness
 
 
-def _neighbours(lattice: Lattice) -> tuple[NDArray[np.generic], ...]:
+def _neighbours(lattice: Lattice) -> tuple[NDArray[Any], ...]:
     cell = np.concatenate([lattice.first, lattice.second])
     other = np.concatenate([lattice.second, lattice.first])
     order = np.lexsort((other, cell))

@@ -40,7 +40,7 @@ def build_walls(mould: Mould, height: float, stiffness: float = STIFFNESS) -> Wa
 
 
 @kernel
-def _depth_kernel(x, y, walls):  # type: ignore[no-untyped-def]
+def _depth_kernel(x, y, walls):
     """Depth in a wall at (x, y), and its gradient, by a quadratic B-spline over 3 x 3 knots."""
     rows, columns = walls.depth.shape
     u = (x - walls.x0) / SPACING
@@ -68,7 +68,7 @@ def _depth_kernel(x, y, walls):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _far_kernel(x, y, walls):  # type: ignore[no-untyped-def]
+def _far_kernel(x, y, walls):
     """Whether (x, y) is clearly away from walls: depth changes by at most 1 a length."""
     rows, columns = walls.depth.shape
     column = int((x - walls.x0) / SPACING)
@@ -78,7 +78,7 @@ def _far_kernel(x, y, walls):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def wall_energy(x, y, z, walls):  # type: ignore[no-untyped-def]
+def wall_energy(x, y, z, walls):
     """Wall energy of one cell (kappa0 l0^2), and its gradient along x, y and z (kappa0 l0)."""
     depth, along_x, along_y = -1.0, 0.0, 0.0
     if not _far_kernel(x, y, walls):

@@ -75,8 +75,8 @@ def _check_folder(folder: Path) -> Iterator[str]:
 def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
     """Ids and seeds are unique, every mould is found and used once."""
     for what, values in (
-        ("simulation id", [run.simulation for run in runs]),
-        ("seed", [run.seed for run in runs]),
+        ("simulation id", [str(run.simulation) for run in runs]),
+        ("seed", [str(run.seed) for run in runs]),
         ("mould", [run.mould for run in runs]),
     ):
         if len(set(values)) < len(values):

@@ -84,7 +84,14 @@ def sample_design(rules: DesignRules, moulds: RandomMoulds, seed: int) -> tuple[
         parameters = _draw_parameters(rules, bool(edge[simulation]), np.random.default_rng(values))
         number = int(run_seed.generate_state(1, np.uint64)[0] >> np.uint64(11))
         runs.append(
-            Run(simulation, mould.name, splits[simulation], bool(edge[simulation]), parameters, number)
+            Run(
+                simulation,
+                mould.name,
+                splits[simulation],
+                bool(edge[simulation]),
+                parameters,
+                number,
+            )
         )
         drawn.append(mould)
     if len({run.seed for run in runs}) < len(runs):

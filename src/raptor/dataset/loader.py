@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import h5py
-import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.data import Dataset
@@ -36,7 +35,9 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
         file, example = self._file, self.examples[number]
         element = Element.from_index(example.element)
         parameters = CellParameters(*(float(file[name][example.sample]) for name in PARAMETERS))
-        masks = np.stack([file[name][example.sample] for name in ("depression", "tethers")])
-        inputs = scale_inputs(*move_pixels(masks, element), parameters)
+        depression, tethers = (
+            move_pixels(file[name][example.sample], element) for name in ("depression", "tethers")
+        )
+        inputs = scale_inputs(depression, tethers, parameters)
         target = self.scaling.forward(apply(file["fields"][example.sample], element))
         return torch.from_numpy(inputs), torch.from_numpy(target)

@@ -71,7 +71,7 @@ def variable(
     long_name: str,
     units: str = "1",
     **options: Any,
-) -> netCDF4.Variable:
+) -> Any:
     """Add a variable with its name, unit and values; numbers are compressed."""
     values = np.asarray(values)
     kind = str if values.dtype.kind in "OU" else values.dtype

@@ -9,7 +9,12 @@ import numpy as np
 
 from raptor.dataset.netcdf import open_file
 
-TABLES = ("design/design.csv", "design/moulds.geojson", "dataset/examples.csv", "dataset/normalisation.json")
+TABLES = (
+    "design/design.csv",
+    "design/moulds.geojson",
+    "dataset/examples.csv",
+    "dataset/normalisation.json",
+)
 
 
 def differences(first: Path, second: Path) -> list[str]:

@@ -115,9 +115,7 @@ def write_shard(
             variable(file, name, ("cell",), column, long_name)
 
 
-def _write_simulations(
-    file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]
-) -> None:
+def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]) -> None:
     along = ("simulation",)
     ids = np.array([run.simulation for run in runs], dtype=np.int32)
     variable(file, "simulation", along, ids, "simulation id")
@@ -162,8 +160,11 @@ def read_shard(path: Path, configuration: str | None = None) -> Shard:
                 "run the workflow again"
             )
         try:
+            shells = [int(shell) for shell in np.atleast_1d(file.shells)]
             model = NetworkModel(
-                int(file.layers), tuple(int(s) for s in np.atleast_1d(file.shells)), str(file.tension)
+                int(file.layers),
+                (shells[0], shells[1], shells[2]),
+                str(file.tension),
             )
             return Shard(_read_records(file), model, str(file.accuracy), str(file.configuration))
         except (AttributeError, KeyError, IndexError, RuntimeError) as error:
@@ -177,10 +178,7 @@ def _read_records(file: netCDF4.Dataset) -> list[Record]:
     sizes = file["row_size"][:]
     if sizes.sum() != len(cells):
         raise IndexError(f"row_size counts {sizes.sum()} cells, the file holds {len(cells)}")
-    values = {
-        name: file[name][:]
-        for name in ("simulation", "seed", *PARAMETERS, *RESULTS, "wall_time")
-    }
+    values = {name: file[name][:] for name in ("simulation", "seed", *PARAMETERS, *RESULTS, "wall_time")}
     records = []
     for row, block in enumerate(np.split(cells, np.cumsum(sizes)[:-1])):
         records.append(

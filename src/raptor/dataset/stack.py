@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import netCDF4
 import numpy as np
@@ -102,9 +102,7 @@ def build_stack(
             raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
 
 
-def create_stack(
-    file: netCDF4.Dataset, samples: int, pixels: int
-) -> Callable[[int, Sample], None]:
+def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[int, Sample], None]:
     """Create a stack's dimensions and variables; returns a function that writes one sample."""
     for name, size in (("sample", samples), ("field", len(FIELDS)), ("y", pixels), ("x", pixels)):
         file.createDimension(name, size)
@@ -127,7 +125,7 @@ def create_stack(
         "n_cells": ("i4", along, "number of cells", {}),
     }  # fmt: skip
     for name, (kind, dimensions, long_name, options) in columns.items():
-        made = file.createVariable(name, kind, dimensions, **options)
+        made = file.createVariable(name, cast(Any, kind), dimensions, **options)
         made.long_name, made.units = long_name, "1"
 
     def write(row: int, sample: Sample) -> None:

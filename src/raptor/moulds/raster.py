@@ -23,7 +23,7 @@ def pixel_size(pixels: int) -> float:
 
 def pixel_centres(pixels: int) -> NDArray[np.float64]:
     """Coordinates of pixel centres along one axis, ascending, (pixels,), l0."""
-    return (np.arange(pixels) - (pixels - 1) / 2) * pixel_size(pixels)
+    return np.asarray((np.arange(pixels) - (pixels - 1) / 2) * pixel_size(pixels))
 
 
 def mould_image(mould: Mould, pixels: int) -> MouldImage:

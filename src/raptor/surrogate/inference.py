@@ -60,8 +60,7 @@ class Surrogate:
         with torch.no_grad():
             for start in range(0, len(parameters), BATCH):
                 batch = [
-                    scale_inputs(depression, tethers, values)
-                    for values in parameters[start : start + BATCH]
+                    scale_inputs(depression, tethers, values) for values in parameters[start : start + BATCH]
                 ]
                 scaled = self.generator(torch.from_numpy(np.stack(batch)))
                 parts.append(self.scaling.inverse(scaled.numpy()))

@@ -169,7 +169,7 @@ def _resume(state: _State, checkpoint: Path, identity: str, device: torch.device
         return
     try:
         packed = torch.load(checkpoint, map_location=device, weights_only=True)
-    except Exception as error:  # noqa: BLE001  any broken file: torch raises many kinds
+    except Exception as error:
         log.warning("checkpoint %s cannot be read (%s); training starts anew", checkpoint, error)
         return
     if packed["identity"] == identity:
@@ -207,13 +207,13 @@ def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> di
     judged = discriminator_loss(
         state.discriminator(inputs, target), state.discriminator(inputs, prediction.detach())
     )
-    judged.backward()
+    judged.backward()  # type: ignore[no-untyped-call]
     state.optimisers[1].step()
 
     state.optimisers[0].zero_grad(set_to_none=True)
     state.discriminator.requires_grad_(False)
     loss = generator_loss(state.discriminator(inputs, prediction), prediction, target, lambda_l1)
-    loss.total.backward()
+    loss.total.backward()  # type: ignore[no-untyped-call]
     state.discriminator.requires_grad_(True)
     state.optimisers[0].step()
     return {
@@ -245,4 +245,8 @@ def write_history(path: Path, history: pd.DataFrame) -> None:
 
 def describe(architecture: Architecture, rules: TrainingRules) -> dict[str, Any]:
     """Architecture and rules, for model.json."""
-    return {"architecture": architecture.as_json(), "training": asdict(rules), "torch": torch.__version__}
+    return {
+        "architecture": architecture.as_json(),
+        "training": asdict(rules),
+        "torch": torch.__version__,
+    }

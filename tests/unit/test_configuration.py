@@ -1,0 +1,91 @@
+import json
+
+import jsonschema
+import pytest
+import yaml
+
+from raptor import configuration
+from raptor.configuration import Configuration, Tissue, load, load_tissues
+from raptor.errors import RaptorError
+
+
+@pytest.fixture
+def root(pytestconfig):
+    return pytestconfig.rootpath
+
+
+def test_schema_defaults_and_key_table_are_those_of_the_model(root, tmp_path):
+    (tmp_path / "config").mkdir()
+    (tmp_path / "workflow").mkdir()
+    for written in configuration.write_reference(tmp_path):
+        committed = root / written.relative_to(tmp_path)
+        assert committed.read_text() == written.read_text(), f"run: raptor reference ({committed})"
+
+
+def test_the_default_configuration_states_every_default(root):
+    assert load(root / "config" / "laptop.yaml") == Configuration()
+
+
+@pytest.mark.parametrize("name", ["laptop", "paper"])
+def test_configurations_fit_schema_and_model(root, name):
+    path = root / "config" / f"{name}.yaml"
+    schema = json.loads((root / "workflow" / "schemas" / "config.schema.json").read_text())
+    jsonschema.validate(yaml.safe_load(path.read_text()), schema)
+    assert load(path).name == name
+
+
+def test_the_paper_is_configured_as_it_states(root):
+    paper = load(root / "config" / "paper.yaml")
+    assert (paper.design.simulations, paper.design.test, paper.design.edge) == (3569, 445, 500)
+    assert (paper.model.layers, paper.fields.pixels) == (7, 256)
+
+
+def test_every_key_is_explained():
+    assert "| None |" not in configuration.key_table()
+
+
+def test_shards_cover_every_simulation_once():
+    config = Configuration.model_validate({"simulation": {"shard_size": 5}})
+    numbers = [range(*(int(n) for n in shard.split("-"))) for shard in config.shards]
+    assert [n for r in numbers for n in (*r, r.stop)] == list(range(64))
+
+
+def test_a_fingerprint_changes_with_what_it_depends_on_alone():
+    plain = Configuration()
+    cores = Configuration.model_validate({"simulation": {"shard_size": 9}, "fit": {"starts": 16}})
+    pixels = Configuration.model_validate({"fields": {"pixels": 64}})
+    for stage in ("design", "simulation", "dataset", "surrogate"):
+        assert plain.fingerprint(stage) == cores.fingerprint(stage)
+    assert plain.fingerprint("simulation") == pixels.fingerprint("simulation")
+    assert plain.fingerprint("dataset") != pixels.fingerprint("dataset")
+
+
+def test_all_tissues_can_be_fitted(root, monkeypatch):
+    monkeypatch.chdir(root)
+    tissues = load_tissues(root / "config" / "tissues.yaml")
+    assert {"glial_1", "glial_2", "glial_3", "fibroblast", "corneal"} <= set(tissues)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("- a", "holds no keys"), ("a: [", "is not YAML"),
+        ("design: {tset: 3}", "unknown key 'design.tset'; did you mean 'test'"),
+        ("model: {shells: [2, 3, 4]}", "shells is"),
+        ("moulds: {symmetry: {none: 0}}", "positive weight"),
+        ("moulds: {cells: [9, 3]}", "ascending"),
+        ("name: Bad Name", "name: String should match"),
+        ("seed: .nan", "seed"),
+    ],
+)  # fmt: skip
+def test_a_bad_configuration_is_named(tmp_path, text, message):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(RaptorError, match=message) as caught:
+        load(path)
+    assert "bad.yaml" in str(caught.value)
+
+
+def test_a_tissue_needs_a_measurement():
+    with pytest.raises(ValueError, match="neither area_ratio nor width_ratio"):
+        Tissue.model_validate({"description": "x", "mould": "y"})

@@ -1,0 +1,46 @@
+"""Bad input stops before any job starts, with one clear sentence and a non-zero status."""
+
+import pytest
+import yaml
+
+from tests.workflow.test_end_to_end import variant
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"desing": {}}, "unknown key 'desing'; did you mean 'design'?"),
+        (
+            {"design__simulatoins": 3},
+            "unknown key 'design.simulatoins'; did you mean 'simulations'?",
+        ),
+        ({"design__test": 8}, "leave none of the 8 simulations for training"),
+        ({"design__delta": [0.0, 0.95]}, "delta is [0.0, 0.95]"),
+        ({"design__kappa_nnnn": [0.6, 0.7]}, "within [0.01, 0.5]"),
+        ({"fields__pixels": 100}, "fields.pixels"),
+        ({"moulds__cells": [100, 400000]}, "more than 2 layers hold"),
+        ({"tradeoff__simulations": 3}, "only 2 simulations are held out"),
+        ({"fit__tissues": ["glial"]}, "has no tissue 'glial'; did you mean 'glial_"),
+        ({"fit__tissues_file": "none.yaml"}, "none.yaml cannot be read"),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_a_bad_configuration(workplace, tmp_path, change, message):
+    place = workplace("bad")
+    done = place.run("--cores", "1", configuration=variant(tmp_path, **change))
+    assert done.returncode != 0
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (place.folder / "results").exists()
+
+
+def test_a_bad_mould_of_a_tissue(workplace, tmp_path):
+    (tmp_path / "cross.geojson").write_text(
+        '{"type": "Polygon", "coordinates": [[[0, 0], [5, 5], [5, 0], [0, 5], [0, 0]]]}'
+    )
+    tissue = {"description": "x", "mould": str(tmp_path / "cross.geojson"), "area_ratio": 0.8}
+    (tmp_path / "tissues.yaml").write_text(yaml.safe_dump({"mine": tissue}))
+    change = {"fit__tissues": ["mine"], "fit__tissues_file": str(tmp_path / "tissues.yaml")}
+    done = workplace("cross").run("--cores", "1", configuration=variant(tmp_path, **change))
+    assert done.returncode != 0
+    assert "not a simple polygon" in done.stderr

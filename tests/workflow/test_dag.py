@@ -1,0 +1,68 @@
+"""What a change makes run again: the set of rules in the resolved DAG."""
+
+import pytest
+import yaml
+
+from tests.workflow.test_end_to_end import variant
+
+EVERYTHING = {
+    "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
+    "augment_dataset", "check_dataset", "write_card", "train_surrogate", "evaluate_surrogate",
+    "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
+    "plot_training", "plot_fit", "plot_tradeoff",
+}  # fmt: skip
+
+
+@pytest.fixture
+def place(finished):
+    assert finished.result.returncode == 0, finished.result.stderr[-3000:]
+    return finished
+
+
+def test_an_empty_folder_needs_everything(workplace):
+    assert workplace("empty").jobs() == EVERYTHING
+
+
+def test_a_second_run_has_nothing_to_do(place):
+    assert place.jobs() == set()
+    assert "Nothing to be done" in place.run("--cores", "1").stderr
+
+
+def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
+    tissues = yaml.safe_load((place.folder / "config" / "tissues.yaml").read_text())
+    tissues["glial_1"]["area_ratio"] = 0.7
+    path = tmp_path / "tissues.yaml"
+    path.write_text(yaml.safe_dump(tissues))
+    jobs = place.jobs(configuration=variant(tmp_path, fit__tissues_file=str(path)))
+    assert jobs == {"record_configuration", "fit_tissue", "tabulate_fits", "plot_fit", "all"}
+
+
+@pytest.mark.parametrize(
+    ("change", "not_again"),
+    [
+        (
+            {"surrogate__epochs": 3},
+            {"sample_design", "simulate_shard", "build_stack", "check_dataset"},
+        ),
+        ({"fields__pixels": 64}, {"sample_design", "simulate_shard"}),
+        ({"tradeoff__seeds": 5}, {"simulate_shard", "train_surrogate", "fit_tissue", "plot_fit"}),
+        ({"simulation__accuracy": "standard"}, {"sample_design", "compile_kernels", "plot_design"}),
+        ({"seed": 1}, {"compile_kernels"}),
+    ],
+    ids=lambda value: str(next(iter(value))) if isinstance(value, dict) else "",
+)
+def test_a_change_runs_what_hangs_on_it_and_no_more(place, tmp_path, change, not_again):
+    jobs = place.jobs(configuration=variant(tmp_path, **change))
+    assert jobs
+    assert not jobs & not_again
+
+
+def test_targets_make_their_part(workplace):
+    place = workplace("targets")
+    assert "train_surrogate" not in place.jobs("dataset")
+    assert "evaluate_surrogate" not in place.jobs("train")
+    assert {"evaluate_surrogate", "train_surrogate"} <= place.jobs("evaluate")
+    assert {"fit_tissue", "plot_fit"} <= place.jobs("fit")
+    assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
+    assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
+    assert place.jobs("report") == EVERYTHING - {"all"} | {"report"}

@@ -1,0 +1,165 @@
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import netCDF4
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+import yaml
+from safetensors.numpy import load_file
+
+from raptor.dataset.checks import check
+from raptor.dataset.same import differences
+from raptor.symmetry import FIELDS
+from tests.workflow.conftest import TINY
+
+
+@pytest.fixture
+def results(finished):
+    assert finished.result.returncode == 0, finished.result.stderr[-3000:]
+    return finished.folder / "results" / "tiny"
+
+
+def test_the_run_ends_with_the_report(results):
+    text = (results / "report.html").read_text()
+    for name in (
+        "fields.png",
+        "bulk.png",
+        "training.png",
+        "tradeoff.png",
+        "design.png",
+        "fit_glial_1.png",
+    ):
+        assert name in text
+    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv"):
+        assert name in text
+
+
+def test_the_data_set_is_sound_and_opens_with_xarray(results):
+    assert check(results) == []
+    with xr.open_dataset(results / "dataset" / "fields.nc") as stack:
+        assert dict(stack.sizes) == {"sample": 8, "field": 8, "y": 32, "x": 32}
+        assert [str(f) for f in stack["field"].values] == list(FIELDS)
+        assert float(stack["fields"].sel(field="density").sum()) == pytest.approx(
+            int(stack["n_cells"].sum()), rel=1e-4
+        )
+    examples = pd.read_csv(results / "dataset" / "examples.csv")
+    with xr.open_dataset(results / "dataset" / "augmented.nc") as augmented:
+        assert augmented.sizes["sample"] == len(examples)
+        assert (augmented["element"].values == examples["element"]).all()
+
+
+def test_every_file_says_what_it_is(results):
+    for path in [
+        *results.glob("simulations/*.nc"),
+        *results.glob("dataset/*.nc"),
+        *results.glob("fits/*.nc"),
+    ]:
+        with netCDF4.Dataset(path) as file:
+            for name in (
+                "Conventions",
+                "title",
+                "source",
+                "history",
+                "references",
+                "configuration",
+            ):
+                assert getattr(file, name), (path, name)
+            for variable in file.variables.values():
+                assert variable.long_name, (path, variable.name)
+                assert variable.units, (path, variable.name)
+
+
+def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
+    weights = load_file(results / "surrogate" / "pix2pix" / "weights.safetensors")
+    assert all(np.isfinite(value).all() for value in weights.values())
+    history = pd.read_csv(results / "surrogate" / "pix2pix" / "training.csv")
+    assert history["epoch"].tolist() == [0, 1]
+    assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
+    metrics = json.loads((results / "evaluation" / "pix2pix" / "metrics.json").read_text())
+    assert metrics["samples"] == 2
+    assert set(metrics["bulk"]) == {
+        "P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar", "area_ratio", "width_ratio",
+    }  # fmt: skip
+    fit = json.loads((results / "fits" / "glial_1.json").read_text())
+    assert fit["simulation"]["rss"] >= 0
+    tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
+    assert tradeoff["method"].tolist() == ["draft", "standard", "surrogate"]
+    assert (tradeoff["core_seconds"] > 0).all()
+
+
+def test_every_figure_has_its_data(results):
+    for figure in ("design", "fields", "bulk", "training", "tradeoff", "fit_glial_1"):
+        made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
+        assert {".png", ".svg"} <= made
+        assert made & {".csv", ".nc"}
+
+
+def variant(tmp_path, **changes):
+    """The tiny configuration with other values, keys given as block__key."""
+    content = yaml.safe_load(TINY.read_text())
+    for key, value in changes.items():
+        block, _, name = key.partition("__")
+        if name:
+            content.setdefault(block, {})[name] = value
+        else:
+            content[block] = value
+    path = tmp_path / "variant.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_one_core_and_other_shards_give_the_same_data(results, workplace, tmp_path):
+    for cores, size in ((1, 1), (2, 8)):
+        place = workplace(f"cores{cores}")
+        done = place.run(
+            "--cores",
+            str(cores),
+            "dataset",
+            configuration=variant(tmp_path, simulation__shard_size=size),
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert differences(results, place.folder / "results" / "tiny") == []
+
+
+def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
+    """SIGKILL to everything, twice: among simulations and in training."""
+    place = workplace("killed")
+    folder = place.folder / "results" / "tiny"
+    for seen in ("simulations/00000-00002.nc", "surrogate/pix2pix/checkpoint.pt"):
+        run = subprocess.Popen(
+            place.command("--cores", "1", "--nolock", "--rerun-incomplete", "train"),
+            cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        deadline = time.monotonic() + 300
+        while not (folder / seen).exists():
+            assert time.monotonic() < deadline, f"{seen} never appeared"
+            assert run.poll() is None, f"the run ended before {seen} appeared"
+            time.sleep(0.005)
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+    done = place.run("--cores", "2", "train")
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert differences(results, folder) == []
+    weights = [load_file(f / "surrogate" / "pix2pix" / "weights.safetensors") for f in (results, folder)]
+    assert all(np.array_equal(weights[0][name], weights[1][name]) for name in weights[0])
+
+
+def test_a_truncated_shard_stops_the_run_with_one_sentence(results, workplace):
+    place = workplace("truncated")
+    shutil.copytree(results.parents[1] / "results", place.folder / "results")
+    shutil.copytree(results.parents[1] / ".snakemake", place.folder / ".snakemake")
+    shard = next((place.folder / "results" / "tiny" / "simulations").glob("*.nc"))
+    shard.write_bytes(shard.read_bytes()[:2000])
+    done = place.run("--cores", "1", "dataset")
+    assert done.returncode != 0
+    assert f"{shard.name} is cut short or not netCDF" in done.stderr + done.stdout
+    shard.unlink()
+    done = place.run("--cores", "2", "dataset")
+    assert done.returncode == 0
+    assert differences(results, place.folder / "results" / "tiny") == []

@@ -1,0 +1,89 @@
+"""Lint, format and types; and the sizes and layers of the house."""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.workflow.conftest import ROOT
+
+
+def run(*command, **options):
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **options)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("ruff", "check", "."),
+        ("ruff", "format", "--check", "."),
+        ("snakefmt", "--check", "--quiet", "Snakefile", "workflow"),
+        ("mypy",),
+    ],
+    ids=" ".join,
+)
+def test_clean(command):
+    folder = Path(sys.executable).parent
+    done = run(f"{folder}/{command[0]}", *command[1:])
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_snakemake_lint():
+    done = run(sys.executable, "-m", "snakemake", "--lint", "json")
+    report = json.loads(done.stdout[done.stdout.index("{") :]) if "{" in done.stdout else {"rules": []}
+    found = {
+        lint["title"] for rule in report.get("rules", []) for lint in rule["lints"]
+    } | {lint["title"] for file in report.get("snakefiles", []) for lint in file["lints"]}  # fmt: skip
+    # workflow/env provides one locked environment for all rules, without conda or containers.
+    assert found <= {"Specify a conda environment or container for each rule."}
+
+
+def test_every_rule_is_complete():
+    for path in [ROOT / "Snakefile", *(ROOT / "workflow" / "rules").glob("*.smk")]:
+        for rule in path.read_text().split("\nrule ")[1:]:
+            name, body = rule.split(":", 1)
+            body = body.split("\n\n\n")[0]
+            assert '"""' in body, f"{name} has no docstring"
+            if "script:" in body:
+                for directive in ("output", "log", "benchmark", "threads", "resources"):
+                    assert f"    {directive}:" in body, f"{name} has no {directive}"
+
+
+LAYERS = (
+    ("errors", "files", "compiled", "jobs", "parameters", "symmetry"), ("moulds",), ("condor", "morphology"),
+    ("fields", "metrics"), ("dataset",), ("surrogate",),
+    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("cli",),
+)  # fmt: skip
+HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
+
+
+def test_imports_run_one_way():
+    package = ROOT / "src" / "raptor"
+    for path in package.rglob("*.py"):
+        layer = path.relative_to(package).parts[0].removesuffix(".py")
+        if layer == "__init__":
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("raptor."):
+                used = node.module.split(".")[1]
+                assert HEIGHT[used] <= HEIGHT[layer], f"{path.name} of {layer} imports {used}"
+
+
+def test_a_simulation_job_leaves_heavy_imports_alone():
+    modules = "raptor.dataset.design, raptor.dataset.shards, raptor.jobs, raptor.moulds"
+    heavy = "{'torch', 'xarray', 'pandas', 'matplotlib', 'pydantic'}"
+    done = run(sys.executable, "-c", f"import sys, {modules}; print({heavy} & set(sys.modules))")
+    assert done.stdout.strip() == "set()", done.stdout + done.stderr
+
+
+def test_kernels_agree_with_their_twins_without_compilation():
+    tests = ["tests/unit/test_fields.py", "tests/physics/test_energy.py"]
+    chosen = "slow_twin or exact or opposite"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = run(sys.executable, "-m", "pytest", "-q", "-k", chosen, *tests, env=environment)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert " passed" in done.stdout

@@ -34,9 +34,10 @@ localrules:
     report,
 
 
+# Everything: data set, surrogate, evaluation, fits, trade-off, figures. (A comment: snakefmt puts
+# default_target first, and takes no docstring after it.)
 rule all:
     default_target: True
-    """Everything: data set, surrogate, evaluation, fits, trade-off, figures."""
     input:
         rules.dataset.input,
         rules.train.input,

@@ -145,7 +145,7 @@ class Surrogate(Block):
     base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
     dropout: float = Field(0.0, ge=0, lt=1, description="in the three deepest decoder layers (pix2pix: 0.5)")
     patch_layers: int = Field(3, ge=1, le=5, description="strided layers of the discriminator")
-    epochs: Positive = Field(50, description="passes over the augmented examples")
+    epochs: Positive = Field(70, description="passes over the augmented examples")
     batch_size: int = Field(4, ge=2, description="examples a step")
     learning_rate: float = Field(1e-3, gt=0, lt=1, description="of Adam, for both networks (pix2pix: 2e-4)")
     beta1: float = Field(0.5, ge=0, lt=1, description="of Adam")

@@ -78,6 +78,12 @@ class Case:
         )
 
 
+def spread_over_delta(runs: list[Run], count: int) -> list[Run]:
+    """So many held-out runs, from the least Delta to the largest, evenly by rank."""
+    held_out = sorted((r for r in runs if r.split == "test"), key=lambda run: run.parameters.delta)
+    return [held_out[i] for i in np.linspace(0, len(held_out) - 1, count).round().astype(int)]
+
+
 def compare(
     cases: list[Case],
     accuracies: tuple[str, ...],

@@ -133,7 +133,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     folder = place.folder / "results" / "tiny"
     for seen in ("simulations/00000-00002.nc", "surrogate/pix2pix/checkpoint.pt"):
         run = subprocess.Popen(
-            place.command("--cores", "1", "--nolock", "--rerun-incomplete", "train"),
+            place.command("--cores", "2", "--nolock", "--rerun-incomplete", "train"),
             cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         deadline = time.monotonic() + 300

@@ -21,7 +21,7 @@ def run(*command, **options):
     [
         ("ruff", "check", "."),
         ("ruff", "format", "--check", "."),
-        ("snakefmt", "--check", "--quiet", "Snakefile", "workflow"),
+        ("snakefmt", "--check", "Snakefile", "workflow"),
         ("mypy",),
     ],
     ids=" ".join,
@@ -47,7 +47,7 @@ def test_every_rule_is_complete():
         for rule in path.read_text().split("\nrule ")[1:]:
             name, body = rule.split(":", 1)
             body = body.split("\n\n\n")[0]
-            assert '"""' in body, f"{name} has no docstring"
+            assert '"""' in body or name == "all", f"{name} has no docstring"
             if "script:" in body:
                 for directive in ("output", "log", "benchmark", "threads", "resources"):
                     assert f"    {directive}:" in body, f"{name} has no {directive}"

@@ -104,5 +104,9 @@ rule dataset:
     """The checked data set."""
     input:
         rules.record_configuration.output,
+        # Named one by one: Snakemake does not make a lost file again that no target asks for.
+        rules.build_stack.input.shards,
+        rules.build_stack.output,
+        rules.augment_dataset.output,
         rules.check_dataset.output,
         rules.write_card.output,

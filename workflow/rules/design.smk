@@ -19,6 +19,14 @@ rule sample_design:
         mem_mb=500,
     params:
         configuration=CONFIG.fingerprint("design"),
-        dump=CONFIG.model_dump(mode="json"),
+        dump=CONFIG.model_dump(
+            mode="json",
+            include={
+                "seed": True,
+                "design": True,
+                "moulds": True,
+                "model": {"layers"},
+            },
+        ),
     script:
         "../scripts/sample_design.py"

@@ -10,7 +10,7 @@ from raptor.jobs import logged, progress
 from raptor.moulds import read_moulds
 from raptor.parameters import NetworkModel
 from raptor.surrogate.inference import load
-from raptor.tradeoff import Case, compare
+from raptor.tradeoff import Case, compare, spread_over_delta
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(1)
@@ -18,11 +18,8 @@ with logged(snakemake.log[0]):
     model = NetworkModel(given["layers"], tuple(given["shells"]), given["tension"])
     surrogate = load(Path(snakemake.input.weights).parent)
     moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
-    held_out = [run for run in read_design(Path(snakemake.input.design)) if run.split == "test"]
-    cases = [
-        Case(run, moulds[run.mould], model, surrogate.architecture.pixels)
-        for run in held_out[: chosen["simulations"]]
-    ]
+    runs = spread_over_delta(read_design(Path(snakemake.input.design)), chosen["simulations"])
+    cases = [Case(run, moulds[run.mould], model, surrogate.architecture.pixels) for run in runs]
     total = len(cases) * (chosen["seeds"] + len(chosen["accuracies"]))
     with progress("trade-off", total) as done:
         table = compare(cases, tuple(chosen["accuracies"]), chosen["seeds"], surrogate, done)

@@ -28,9 +28,9 @@ class Accuracy:
     solver : str
         Name written to files.
     contraction : Contraction
-        Steps and tolerances (kappa0 l0).
+        Steps and tolerances (kappa0 l0, over Delta).
     warm_sweeps : int
-        Sweeps of an anneal from `warm_temperature` after the contraction; it removes domain walls
+        Sweeps of an anneal from `WARM_TEMPERATURE` after the contraction; it removes domain walls
         between orientations without folding.
     cold_sweeps : int
         Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
@@ -47,11 +47,12 @@ class Accuracy:
         return replace(self.contraction, steps=1)
 
 
-WARM_TEMPERATURE = 0.01  # kappa0 l0^2
+WARM_TEMPERATURE = 0.012  # kappa0 l0^2, over Delta^2: energies grow as Delta^2
 WARM_FACTOR = 1e4
+SMALLEST_DELTA = 0.02
 
 ACCURACIES: dict[str, Accuracy] = {
-    # Largest gradient left: 0.03, 0.01, 0.001 kappa0 l0.
+    # Largest gradient left, over Delta: 0.03, 0.01, 0.001 kappa0 l0.
     "draft": Accuracy("relax", Contraction(1, 3e-2, 0, 3e-2, 1500)),
     "standard": Accuracy("contract", Contraction(20, 3e-2, 100, 1e-2, 6000)),
     "reference": Accuracy("contract", Contraction(20, 1e-2, 200, 1e-3, 20000), warm_sweeps=2000),
@@ -200,7 +201,7 @@ def _solve(
             delta,
             rng,
             sweeps=accuracy.warm_sweeps,
-            initial_temperature=WARM_TEMPERATURE,
+            initial_temperature=WARM_TEMPERATURE * max(delta, SMALLEST_DELTA) ** 2,
             temperature_factor=WARM_FACTOR,
         )
         last = contract(warm.state, network, walls, delta, accuracy.last)

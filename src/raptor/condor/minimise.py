@@ -18,7 +18,10 @@ from raptor.condor.walls import Walls
 from raptor.errors import RaptorError
 
 MEMORY = 8  # pairs of steps that the inverse Hessian is built from
-MAX_STEP = 0.15  # l0, and radians: the farthest that one step moves any coordinate
+MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell
+MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
+LEVER = 1.0  # over Delta
+SMALLEST_LEVER = 0.02
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
 
@@ -68,6 +71,15 @@ def _largest(a):
     for i in range(a.size):
         value = max(value, abs(a[i]))
     return value
+
+
+@kernel
+def _longest_step(direction, lever):
+    """The longest multiple of a direction that keeps every move and turn within bounds."""
+    half = direction.size // 2
+    move = _largest(direction[:half])
+    turn = _largest(direction[half:]) / lever
+    return min(MAX_STEP / max(move, 1e-300), MAX_TURN / max(turn, 1e-300))
 
 
 @kernel
@@ -127,7 +139,7 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, tolerance, limit, work):
+def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(
         state, work.gradient, network, walls, delta, work.unit, work.force, work.buffer
@@ -143,9 +155,9 @@ def _minimise_kernel(state, network, walls, delta, tolerance, limit, work):
             stored = 0
             _direction_kernel(work, stored, newest)
             slope = _dot(work.direction, work.gradient)
-        length = min(1.0, MAX_STEP / _largest(work.direction))
+        length = min(1.0, _longest_step(work.direction, lever))
         if stored == 0:
-            length = min(length, 0.02 / _largest(work.direction))
+            length = min(length, 0.1 * _longest_step(work.direction, lever))
         length, new_energy, new_walled, trials = _search_kernel(
             state, energy + walled, slope, length, network, walls, delta, work
         )
@@ -173,6 +185,16 @@ def _minimise_kernel(state, network, walls, delta, tolerance, limit, work):
     return energy, walled, _largest(work.gradient), used
 
 
+def orientation_lever(delta: float) -> float:
+    """Length of the vectors that stand for orientations while a state is minimised, l0.
+
+    Displacements grow as Delta and energy as Delta^2, so the energy of turning a cell is Delta^2
+    times as stiff as that of moving it. With vectors of length Delta both are equally stiff, and
+    forces and torques (per length) both grow as Delta: the scale of the tolerance.
+    """
+    return max(LEVER * delta, SMALLEST_LEVER)
+
+
 def minimise(
     state: NDArray[np.float64],
     network: Network,
@@ -187,7 +209,8 @@ def minimise(
     Parameters
     ----------
     tolerance : float
-        Largest component of the gradient at which the state has converged, kappa0 l0.
+        Largest component of the gradient at which the state has converged, in units of
+        kappa0 l0 times `orientation_lever(delta)`.
     limit : int
         Evaluations of the objective at most.
 
@@ -199,6 +222,8 @@ def minimise(
     if state.size != 6 * (len(network.start) - 1) or not np.isfinite(state).all():
         raise RaptorError("the state to minimise does not fit the network, or is not finite")
     state = unit_orientations(state)
+    lever = orientation_lever(delta)
+    state[state.size // 2 :] *= lever
     unit, force, buffer = scratch(state.size // 6)
     work = _Work(
         gradient=np.empty_like(state),
@@ -212,6 +237,10 @@ def minimise(
         force=force,
         buffer=buffer,
     )
-    energy, walled, gradient, used = _minimise_kernel(state, network, walls, delta, tolerance, limit, work)
+    energy, walled, gradient, used = _minimise_kernel(
+        state, network, walls, delta, lever, tolerance * lever, limit, work
+    )
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
-    return Minimum(unit_orientations(state), energy, walled, gradient, used, finite and gradient <= tolerance)
+    return Minimum(
+        unit_orientations(state), energy, walled, gradient, used, finite and gradient <= tolerance * lever
+    )

@@ -4,7 +4,7 @@ from snakemake.utils import min_version
 
 min_version("9.27")
 
-if "name" not in config:
+if not config:
 
     configfile: "config/laptop.yaml"
 
@@ -21,6 +21,7 @@ include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/fit.smk"
 include: "workflow/rules/tradeoff.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
 
 
 localrules:
@@ -31,26 +32,10 @@ localrules:
     fit,
     tradeoff,
     figures,
-    report,
 
 
-# Everything: data set, surrogate, evaluation, fits, trade-off, figures. (A comment: snakefmt puts
-# default_target first, and takes no docstring after it.)
+# Everything. (A comment: snakefmt puts default_target first, and takes no docstring after it.)
 rule all:
     default_target: True
     input:
-        rules.dataset.input,
-        rules.train.input,
-        rules.evaluate.input,
-        rules.fit.input,
-        rules.tradeoff.input,
-        rules.figures.input,
-
-
-rule report:
-    """What the report shows; the report itself is written when the run ends."""
-    input:
-        rules.all.input,
-
-
-include: "workflow/rules/report.smk"
+        rules.report.output,

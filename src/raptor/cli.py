@@ -31,7 +31,7 @@ def simulate(
     output: Output,
     layers: Annotated[int, typer.Option(help="cell layers between floor and fill height")] = 7,
     accuracy: Annotated[str, typer.Option(help="draft, standard or reference")] = "standard",
-    seed: Annotated[int, typer.Option(min=0, help="of the first orientations")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of the first orientations")] = 0,
 ) -> None:
     """Simulate one mould and write a file of the form of a shard.
 
@@ -77,6 +77,7 @@ def predict(
     Example: raptor predict config/moulds/four_post_rectangle.geojson --delta 0.5
     --kappa-nnn 0.5 --kappa-nnnn 0.3 --model results/laptop/surrogate/pix2pix --output tissue.nc
     """
+    from raptor.condor import cast_sites
     from raptor.moulds import read_mould
     from raptor.parameters import CellParameters
     from raptor.surrogate.inference import load, write_prediction
@@ -84,6 +85,7 @@ def predict(
     parameters = CellParameters(delta, kappa_nnn, kappa_nnnn).require_sampled("prediction")
     shape = read_mould(mould)
     _require_writable(output)
+    cast_sites(shape, 1)  # a mould without a cell has no tissue to predict
     surrogate = load(model)
     area, width = write_prediction(output, surrogate, shape, parameters)
     typer.echo(f"{output}: A/A0 {area:.3f}, w/w0 {width:.3f} ({surrogate.layers} layers)")
@@ -113,6 +115,9 @@ def same(
     """Say whether two results folders hold the same data: bit-equal but for times."""
     from raptor.dataset.same import differences
 
+    for folder in (first, second):
+        if not (folder / "dataset" / "fields.nc").is_file():
+            raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder")
     found = differences(first, second)
     for difference in found:
         typer.echo(difference)
@@ -125,7 +130,7 @@ def reference(
     root: Annotated[Path, typer.Argument(help="the project's folder")] = Path(),
 ) -> None:
     """Write what is generated from the configuration model: JSON schema and key table."""
-    from raptor.configuration import write_reference
+    from raptor.reference import write_reference
 
     for path in write_reference(root):
         typer.echo(path)

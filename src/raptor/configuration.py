@@ -11,11 +11,12 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from raptor import MODEL_VERSION
+from raptor.condor.lattice import cast_sites
 from raptor.dataset.design import DesignRules
 from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.morphology import central_section
 from raptor.moulds.geojson import read_mould
-from raptor.moulds.geometry import IMAGE_SIZE
+from raptor.moulds.geometry import IMAGE_SIZE, SMALLEST_TETHER
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, NetworkModel, largest_kappa_nnnn
 
@@ -81,7 +82,7 @@ class Moulds(Block):
     tethers: tuple[int, int] = Field((2, 16), description="bounds of the number of tethers")
     tether_radius: tuple[float, float] = Field((0.8, 1.5), description="bounds of the tethers' radius")
     arm_width: float = Field(4.0, gt=0, le=20, description="narrowest neck, and gap between tethers")
-    margin: float = Field(3.0, ge=0, le=20, description="rim of the image that stays free")
+    margin: float = Field(3.0, ge=2.2, le=20, description="rim of the image that stays free: 3 sigma or more")
     symmetry: dict[Literal["none", "mirror", "half_turn", "mirrors", "square"], Weight] = Field(
         {"none": 0.3, "mirror": 0.25, "half_turn": 0.2, "mirrors": 0.2, "square": 0.05},
         description="weight of each symmetry class",
@@ -89,7 +90,7 @@ class Moulds(Block):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Moulds":
-        for name, least in (("cells", 1), ("tethers", 0), ("tether_radius", 0.1)):
+        for name, least in (("cells", 1), ("tethers", 0), ("tether_radius", SMALLEST_TETHER)):
             low, high = getattr(self, name)
             if not least <= low <= high:
                 raise ValueError(f"{name} is [{low}, {high}]; an ascending range from {least} is needed")
@@ -236,8 +237,8 @@ class Configuration(Block):
 
     def _depends(self, stage: str) -> Any:
         dump = self.model_dump(mode="json")
-        design = [self.seed, dump["design"], dump["moulds"], self.model.layers]
-        simulation = [design, dump["model"], self.simulation.accuracy, MODEL_VERSION]
+        design = [self.seed, dump["design"], dump["moulds"], self.model.layers, MODEL_VERSION]
+        simulation = [design, dump["model"], self.simulation.accuracy]
         dataset = [simulation, dump["fields"]]
         surrogate = [dataset, dump["surrogate"]]
         stages = {
@@ -289,8 +290,10 @@ def load(path: Path) -> Configuration:
     return parse(_read_yaml(Path(path)), str(path))
 
 
-def load_tissues(path: Path, names: tuple[str, ...] | None = None) -> dict[str, Tissue]:
-    """Read tissues, all or those named, their mould files included.
+def load_tissues(
+    path: Path, names: tuple[str, ...] | None = None, mould_scale: float = 1.0
+) -> dict[str, Tissue]:
+    """Read tissues, all or those named; their moulds are cast and measured at the scale given.
 
     Raises
     ------
@@ -308,8 +311,19 @@ def load_tissues(path: Path, names: tuple[str, ...] | None = None) -> dict[str, 
             chosen[name] = Tissue.model_validate(content[name])
         except ValidationError as error:
             raise RaptorError("; ".join(_explain(error, f"{path}, {name}", Tissue))) from None
-        read_mould(Path(chosen[name].mould))
+        _require_measurable(chosen[name], name, mould_scale)
     return chosen
+
+
+def _require_measurable(tissue: Tissue, name: str, scale: float) -> None:
+    """Find out before any work that a tissue's mould can be cast, and its width measured."""
+    mould = read_mould(Path(tissue.mould)).scaled(scale)
+    cast_sites(mould, 1)
+    if tissue.width_ratio is not None and not central_section(mould).intersects(mould.depression):
+        raise RaptorError(
+            f"tissue {name}: a width ratio is given, but tethers fill the central section of "
+            f"{tissue.mould}; leave the width out or change the mould"
+        )
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -346,62 +360,3 @@ def _keys_beside(model: type[BaseModel], place: tuple[int | str, ...]) -> list[s
             return []
         model = block
     return list(model.model_fields)
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON schema, as it stands in workflow/schemas."""
-    return Configuration.model_json_schema()
-
-
-def write_reference(root: Path) -> list[Path]:
-    """Write the JSON schema, the default configuration and the key table; returns their paths.
-
-    Raises
-    ------
-    RaptorError
-        Where the folder is not the project's.
-    """
-    if not (root / "config").is_dir() or not (root / "workflow").is_dir():
-        raise RaptorError(f"{root.resolve()} has no config/ and workflow/; give the project's folder")
-    contents = {
-        "workflow/schemas/config.schema.json": json.dumps(json_schema(), indent=1) + "\n",
-        "config/laptop.yaml": DEFAULTS_HEAD
-        + yaml.safe_dump(
-            Configuration().model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=100
-        ),
-        "config/README.md": README_HEAD + key_table(),
-    }
-    for name, content in contents.items():
-        with atomic_path(root / name) as temporary:
-            temporary.write_text(content)
-    return [root / name for name in contents]
-
-
-DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about ten minutes on two cores.
-# Every key is explained in config/README.md. Written by `raptor reference`.
-"""
-README_HEAD = """# Configuration
-
-`laptop.yaml` is the default and holds every key; another file, such as `paper.yaml`, states only what
-differs and is chosen by `workflow/env snakemake --cores all --configfile config/paper.yaml`. Unknown keys
-are errors. Moulds are GeoJSON (`moulds/`), measured tissues stand in `tissues.yaml`.
-
-This table and `laptop.yaml` are generated from the model in `src/raptor/configuration.py` by
-`workflow/env raptor reference`.
-
-"""
-
-
-def key_table() -> str:
-    """The table of keys in config/README.md, in Markdown."""
-    rows = ["| key | default | meaning |", "| --- | --- | --- |"]
-    for name, entry in Configuration.model_fields.items():
-        block = entry.annotation
-        if isinstance(block, type) and issubclass(block, BaseModel):
-            defaults = block()
-            for key, inner in block.model_fields.items():
-                value = json.dumps(defaults.model_dump(mode="json")[key])
-                rows.append(f"| `{name}.{key}` | `{value}` | {inner.description} |")
-        else:
-            rows.append(f"| `{name}` | `{json.dumps(entry.default)}` | {entry.description} |")
-    return "\n".join(rows) + "\n"

@@ -52,6 +52,14 @@ def cast_density(mould: Mould, layers: int, pixels: int) -> NDArray[np.float64]:
     return np.asarray(rasterise(sites, np.ones_like(sites), np.zeros(len(sites)), pixels)[0])
 
 
+def without_sign(fields: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Fields (..., 8, y, x) with sxsz and sysz by magnitude: their sign is spontaneous."""
+    spontaneous = [FIELDS.index(field) for field in ("sxsz", "sysz")]
+    fields = fields.copy()
+    fields[..., spontaneous, :, :] = np.abs(fields[..., spontaneous, :, :])
+    return fields
+
+
 def evaluate(
     surrogate: Surrogate,
     stack: Path,
@@ -62,7 +70,8 @@ def evaluate(
     """Errors and measures of every test sample, one row each.
 
     Columns: what identifies the sample; `vrmse_`, `nrmse_` and `pearson_` of each field;
-    `density_vrmse_` of the baselines; each of `MEASURES` as simulated and as predicted.
+    `density_vrmse_` of the baselines; each of `MEASURES` as simulated and as predicted. sxsz and
+    sysz are compared by magnitude.
     """
     rows = []
     layers = surrogate.layers
@@ -70,12 +79,13 @@ def evaluate(
         mould = moulds[sample.mould]
         masks = (sample.depression.astype(bool), sample.tethers.astype(bool))
         prediction = surrogate.predict(*masks, [sample.parameters])[0]
+        scored = (without_sign(prediction), without_sign(sample.fields))
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
-        row |= asdict(sample.parameters) | {"n_cells": sample.n_cells}
+        row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}
         for name, errors in (
-            ("vrmse", vrmse(prediction, sample.fields)),
-            ("nrmse", nrmse(prediction, sample.fields)),
-            ("pearson", field_pearson(prediction, sample.fields)),
+            ("vrmse", vrmse(*scored)),
+            ("nrmse", nrmse(*scored)),
+            ("pearson", field_pearson(*scored)),
         ):
             row |= {f"{name}_{field}": float(e) for field, e in zip(FIELDS, errors, strict=True)}
         cast = cast_density(mould, layers, prediction.shape[-1])
@@ -99,6 +109,7 @@ def summarise(metrics: pd.DataFrame) -> dict[str, Any]:
     }
     return {
         "samples": len(metrics),
+        "not_converged": int((~metrics["converged"].astype(bool)).sum()),
         "fields": fields,
         "density_vrmse": {
             "surrogate": fields["density"]["vrmse"],

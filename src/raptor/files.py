@@ -28,13 +28,19 @@ def atomic_path(path: Path) -> Iterator[Path]:
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT) or _is_full(path.parent):
+    except RaptorError:
+        raise
+    except Exception as error:
+        # netCDF and torch report a full disk as errors of their own kinds.
+        full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT) or _is_full(path.parent)
+        if full:
             raise RaptorError(
                 f"no room left on the disk for {path}; free some space and run the same command "
                 "again: what is finished is kept"
             ) from error
-        raise RaptorError(f"{path} cannot be written: {error}") from error
+        if isinstance(error, OSError):
+            raise RaptorError(f"{path} cannot be written: {error}") from error
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -1,12 +1,12 @@
 """Fitting cell and matrix parameters to a tissue (paper, "Parameter fitting").
 
 The residual sum of squares of area ratio and central width ratio is minimised within the paper's
-bounds. Three parameters and two numbers: the minimum is a valley, and the covariance says so.
+bounds. Three parameters and two numbers: the minimum is a valley, and the rank of the problem says so.
 """
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from raptor.condor.accuracy import Simulation
+from raptor.errors import RaptorError
 from raptor.fields import rasterise
 from raptor.files import atomic_path
 from raptor.morphology import area_ratio, density_threshold, width_ratio
@@ -32,8 +33,7 @@ from raptor.parameters import (
 )
 from raptor.surrogate.inference import Surrogate
 
-STEP = 0.02  # of a finite difference, in units of a bound's width: the area counts whole pixels
-BOUND_MARGIN = 1e-9
+STEP = 0.02  # of a finite difference, over a bound's width: the area counts whole pixels
 
 Measure = Callable[[Sequence[CellParameters]], NDArray[np.float64]]
 """From parameters to (n, 2): area ratio and central width ratio of each."""
@@ -65,11 +65,8 @@ class Fit:
         Of the model there.
     rss : float
         Residual sum of squares.
-    standard_error : tuple of float or None
-        Of delta, kappa_nnn, kappa_nnnn, by the linearised covariance, if the measurements
-        determine all three; None where they do not.
     rank : int
-        How many combinations of the three parameters the measurements determine.
+        How many combinations of the three parameters the measurements determine there.
     evaluations : int
         Predictions made.
     """
@@ -78,7 +75,6 @@ class Fit:
     area_ratio: float
     width_ratio: float
     rss: float
-    standard_error: tuple[float, ...] | None
     rank: int
     evaluations: int
 
@@ -120,6 +116,11 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
     starts : int
         Points of a Sobol sequence at which the model is evaluated first (a power of two); the
         best four are refined.
+
+    Raises
+    ------
+    RaptorError
+        Where the mould allows none of the measurements.
     """
     points = qmc.Sobol(3, seed=seed).random(starts)
     measured = measure([parameters_at(point) for point in points])
@@ -127,46 +128,34 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
     costs = np.where(np.isfinite(costs), costs, np.inf)
     count = starts
 
+    if not np.isfinite(costs).any():
+        raise RaptorError(
+            "nothing of what was measured can be measured on this mould: a tether may fill its central "
+            "section; give the area ratio alone, or another mould"
+        )
+
     def residuals(unit: NDArray[np.float64]) -> NDArray[np.float64]:
         nonlocal count
         count += 1
         return target.residuals(measure([parameters_at(unit)])[0])
 
+    def jacobian(unit: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal count
+        count += 4
+        steps = np.where(unit + STEP <= 1, STEP, -STEP)
+        points = [unit, *(unit + np.diag(steps))]
+        here, *moved = target.residuals(measure([parameters_at(point) for point in points]))
+        return np.stack([(there - here) / step for there, step in zip(moved, steps, strict=True)], axis=1)
+
     refined = [
-        least_squares(
-            residuals,
-            points[start],
-            bounds=(-BOUND_MARGIN, 1 + BOUND_MARGIN),
-            diff_step=[STEP] * 3,
-            x_scale=0.3,
-            max_nfev=30,
-        )
+        least_squares(residuals, points[start], jacobian, bounds=(0, 1), x_scale=0.3, max_nfev=30)
         for start in np.argsort(costs)[:4]
     ]
     best = min(refined, key=lambda result: float(result.cost))
     parameters = parameters_at(best.x)
     area, width = (float(v) for v in measure([parameters])[0])
-    rank, errors = _covariance(np.asarray(best.jac), best.x, 2 * float(best.cost))
-    return Fit(parameters, area, width, 2 * float(best.cost), errors, rank, count)
-
-
-def _covariance(
-    jacobian: NDArray[np.float64], unit: NDArray[np.float64], rss: float
-) -> tuple[int, tuple[float, ...] | None]:
-    """Rank of the linearised problem and, where it is full, the parameters' standard errors."""
-    rank = int(np.linalg.matrix_rank(jacobian, tol=1e-6))
-    if rank < 3 or len(jacobian) <= 3:
-        return rank, None
-    covariance = np.linalg.inv(jacobian.T @ jacobian) * rss / (len(jacobian) - 3)
-    base = np.array(list(asdict(parameters_at(unit)).values()))
-    slopes = (
-        np.stack(
-            [np.array(list(asdict(parameters_at(unit + STEP * e)).values())) - base for e in np.eye(3)],
-            1,
-        )
-        / STEP
-    )
-    return rank, tuple(float(v) for v in np.sqrt(np.diag(slopes @ covariance @ slopes.T)))
+    rank = int(np.linalg.matrix_rank(np.asarray(best.jac), tol=1e-3))
+    return Fit(parameters, area, width, 2 * float(best.cost), rank, count)
 
 
 def write_fit(path: Path, content: dict[str, Any]) -> None:

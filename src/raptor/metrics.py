@@ -20,17 +20,6 @@ def vrmse(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> NDA
     return np.asarray(np.sqrt(error / (target.var(axis=(-2, -1), dtype=np.float64) + 1e-12)))
 
 
-def pooled_vrmse(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.float64]:
-    """VRMSE of samples (n, fields, y, x) taken together, (fields,).
-
-    Error and variance are summed over the samples before they are divided: a sample in which
-    nothing happens, and whose own variance is next to nothing, does not drown the others.
-    """
-    error = ((prediction - target) ** 2).mean(axis=(0, 2, 3), dtype=np.float64)
-    variance = target.var(axis=(2, 3), dtype=np.float64).mean(axis=0)
-    return np.asarray(np.sqrt(error / (variance + 1e-12)))
-
-
 def nrmse(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.float64]:
     """Root mean square error over the target's root mean square, over the last two axes."""
     error = ((prediction - target) ** 2).mean(axis=(-2, -1), dtype=np.float64)

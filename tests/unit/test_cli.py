@@ -106,3 +106,49 @@ def test_a_failed_writer_leaves_what_was_there(tmp_path):
         raise RuntimeError
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_predict_writes_fields_that_check_takes(tmp_path):
+    from raptor.dataset.scaling import Scaling
+    from raptor.surrogate.inference import save
+    from raptor.surrogate.networks import Architecture, Generator, initialise
+
+    architecture = Architecture(32, 4)
+    weights = initialise(Generator(architecture)).state_dict()
+    save(tmp_path, weights, architecture, Scaling((0.5,) * 8, (0.5,) * 8), 4, {}, "x")
+    output = tmp_path / "prediction.nc"
+    done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
+    assert done.returncode == 0, done.stderr
+    assert "A/A0" in done.stdout
+    with xr.open_dataset(output) as prediction:
+        assert prediction["fields"].dims == ("sample", "field", "y", "x")
+        assert float(prediction["delta"][0]) == 0.5
+    assert raptor("check", output).returncode == 0
+
+
+def test_check_takes_moulds_and_tables(made, tmp_path):
+    for path in (MOULD, made / "design" / "design.csv", made / "dataset" / "normalisation.json"):
+        assert check(Path(path)) == []
+    bad = tmp_path / "bad.geojson"
+    bad.write_text('{"type": "FeatureCollection", "features": [1]}')
+    done = raptor("check", bad)
+    assert done.returncode == 1
+    assert "is not GeoJSON of a mould" in done.stdout
+
+
+def test_a_full_disk_stops_a_simulation_with_one_sentence(tmp_path):
+    """A file-size limit stands in for the full disk: HDF5 reports both in its own way."""
+    script = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
+        "import raptor.files as f; f._is_full = lambda folder: True;"
+        "from raptor.cli import main; main()"
+    )
+    output = tmp_path / "x.nc"
+    arguments = ["simulate", MOULD, *options(), "--layers", 2, "--accuracy", "draft", "--output", output]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert done.stderr.startswith("error: no room left on the disk")
+    assert not list(tmp_path.iterdir())

@@ -4,9 +4,9 @@ import jsonschema
 import pytest
 import yaml
 
-from raptor import configuration
 from raptor.configuration import Configuration, Tissue, load, load_tissues
 from raptor.errors import RaptorError
+from raptor.reference import key_table, write_reference
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def root(pytestconfig):
 def test_schema_defaults_and_key_table_are_those_of_the_model(root, tmp_path):
     (tmp_path / "config").mkdir()
     (tmp_path / "workflow").mkdir()
-    for written in configuration.write_reference(tmp_path):
+    for written in write_reference(tmp_path):
         committed = root / written.relative_to(tmp_path)
         assert committed.read_text() == written.read_text(), f"run: raptor reference ({committed})"
 
@@ -41,7 +41,7 @@ def test_the_paper_is_configured_as_it_states(root):
 
 
 def test_every_key_is_explained():
-    assert "| None |" not in configuration.key_table()
+    assert "| None |" not in key_table()
 
 
 def test_shards_cover_every_simulation_once():

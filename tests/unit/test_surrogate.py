@@ -24,8 +24,8 @@ def test_the_networks_take_any_power_of_two(pixels):
     architecture = Architecture(pixels, 4)
     inputs, fields = torch.zeros(2, 5, pixels, pixels), torch.zeros(2, 8, pixels, pixels)
     assert Generator(architecture)(inputs).shape == fields.shape
-    if pixels >= 32:
-        assert Discriminator(architecture)(inputs, fields).shape[:2] == (2, 1)
+    for layers in (1, 3, 5):
+        assert Discriminator(Architecture(pixels, 4, 0.5, layers))(inputs, fields).shape[:2] == (2, 1)
     with pytest.raises(RaptorError, match="power of two"):
         Architecture(pixels + 1, 4)
 
@@ -110,7 +110,7 @@ def test_a_checkpoint_of_another_training_or_cut_short_is_ignored(training, tmp_
 def model_folder(tmp_path):
     architecture = Architecture(32, 4)
     generator = initialise(Generator(architecture))
-    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, {})
+    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, {}, "a")
     return tmp_path / "model"
 
 
@@ -138,6 +138,9 @@ def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
     text = (model_folder / "model.json").read_text()
     (model_folder / "model.json").write_text(text.replace('"base_channels": 4', '"base_channels": 8'))
     with pytest.raises(RaptorError, match="does not fit the model"):
+        load(model_folder)
+    (model_folder / "model.json").write_text(text.replace('"identity": "a"', '"identity": "b"'))
+    with pytest.raises(RaptorError, match="two trainings"):
         load(model_folder)
     (model_folder / "weights.safetensors").write_bytes(b"short")
     with pytest.raises(RaptorError, match="cannot be read"):
@@ -183,7 +186,6 @@ def test_a_fit_finds_a_tissue_and_says_what_is_not_determined():
     assert fitted.rss < 1e-8
     assert (fitted.area_ratio, fitted.width_ratio) == pytest.approx((area, width), abs=1e-3)
     assert fitted.rank == 2  # two numbers, three parameters
-    assert fitted.standard_error is None
     fitted.parameters.require_sampled("fit")
 
 
@@ -191,3 +193,19 @@ def test_a_fit_without_area_uses_the_width_alone():
     fitted = fit(smooth, Target(None, 0.7), starts=32, seed=0)
     assert fitted.width_ratio == pytest.approx(0.7, abs=1e-3)
     assert fitted.rank == 1
+
+
+def test_a_fit_leaves_a_flat_corner():
+    """Near a lower bound steps keep their size: pixels count, so tiny steps would see nothing."""
+
+    def stepped(parameters):
+        return np.round(smooth(parameters), 2)
+
+    truth = CellParameters(0.6, 0.4, 0.2)
+    area, width = smooth([truth])[0]
+    assert fit(stepped, Target(area, width), starts=32, seed=0).rss < 2e-4
+
+
+def test_a_fit_of_nothing_measurable_is_named():
+    with pytest.raises(RaptorError, match="nothing of what was measured"):
+        fit(lambda parameters: np.full((len(parameters), 2), np.nan), Target(None, 0.5), starts=16, seed=0)

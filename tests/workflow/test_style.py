@@ -34,7 +34,8 @@ def test_clean(command):
 
 def test_snakemake_lint():
     done = run(sys.executable, "-m", "snakemake", "--lint", "json")
-    report = json.loads(done.stdout[done.stdout.index("{") :]) if "{" in done.stdout else {"rules": []}
+    report = json.loads(done.stdout[done.stdout.index("{") :])
+    assert report["rules"]
     found = {
         lint["title"] for rule in report.get("rules", []) for lint in rule["lints"]
     } | {lint["title"] for file in report.get("snakefiles", []) for lint in file["lints"]}  # fmt: skip
@@ -56,7 +57,7 @@ def test_every_rule_is_complete():
 LAYERS = (
     ("errors", "files", "compiled", "jobs", "parameters", "symmetry"), ("moulds",), ("condor", "morphology"),
     ("fields", "metrics"), ("dataset",), ("surrogate",),
-    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("cli",),
+    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",), ("cli",),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

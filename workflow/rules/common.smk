@@ -9,13 +9,18 @@ from raptor import MODEL_VERSION, configuration
 from raptor.compiled import source_hash
 from raptor.errors import RaptorError
 
+if "name" not in config:
+    raise WorkflowError(
+        "the configuration has no name; give its results a folder by 'name: ...'"
+    )
 try:
     CONFIG = configuration.parse(config, "configuration")
     TISSUES = configuration.load_tissues(
-        Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues
+        Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
     )
 except RaptorError as error:
     raise WorkflowError(str(error))
+config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
 
 RESULTS = f"results/{CONFIG.name}"
 MODEL = f"{RESULTS}/surrogate/{CONFIG.surrogate.model}"

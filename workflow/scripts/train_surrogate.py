@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from raptor.configuration import content_hash
 from raptor.dataset.examples import read_examples
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
@@ -21,6 +22,9 @@ with logged(snakemake.log[0]):
         seed=snakemake.params.seed % 2**63,
         threads=snakemake.threads,
     )
+    # A checkpoint goes on only if configuration and data are those that it was made from.
+    files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]
+    identity = content_hash([snakemake.params.identity, *files])
     with progress("training", rules.epochs) as done:
         trained = train(
             stack,
@@ -30,7 +34,7 @@ with logged(snakemake.log[0]):
             architecture,
             rules,
             Path(snakemake.params.checkpoint),
-            snakemake.params.identity,
+            identity,
             lambda epoch, row: done(f"epoch {epoch}, validation error {row['validation_error']:.3f}"),
         )
     save(
@@ -40,5 +44,6 @@ with logged(snakemake.log[0]):
         scaling,
         snakemake.params.layers,
         describe(architecture, rules),
+        identity,
     )
     write_history(Path(snakemake.output.history), trained.history)

@@ -168,7 +168,7 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
     """The state moved and turned in the plane as a whole, so that it lies as it was cast.
 
     Nothing holds a gel without tethers: moved or turned with its cells it has the same energy.
-    Where the walls would be in the way it stays as it is.
+    Where walls are touched, before or after, it stays as it is.
     """
     blocks = state.reshape(6, -1).copy()
     cast, found = sites[:, :2] - sites[:, :2].mean(axis=0), blocks[:2].T - blocks[:2].mean(axis=1)
@@ -177,7 +177,8 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     blocks[:2] = turn @ found.T + sites[:, :2].mean(axis=0)[:, None]
     blocks[3:5] = turn @ blocks[3:5]
-    free = mould.forbidden_depth(blocks[:2].T).max() < 0
+    planes = (state.reshape(6, -1)[:2], blocks[:2])
+    free = all(mould.forbidden_depth(plane.T).max() < 0 for plane in planes)
     return blocks.ravel() if free else state
 
 

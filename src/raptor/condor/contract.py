@@ -24,7 +24,7 @@ class Contraction:
     steps : int
         Steps from Delta = 0 to its value; 1 minimises at the full Delta at once (`relax`).
     step_tolerance, step_limit : float, int
-        Largest gradient (kappa0 l0) and evaluations at which a step before the last is left.
+        Largest gradient (kappa0 l0, over Delta) and evaluations at which a step before the last is left.
     tolerance, limit : float, int
         The same for the final minimisation.
     """

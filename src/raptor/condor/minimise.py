@@ -182,6 +182,8 @@ def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work
             work.curvature[slot] = curvature
             newest = slot
             stored = min(stored + 1, memory)
+        else:
+            stored = min(stored, memory - 1)  # the pair that stood in this slot is gone
     return energy, walled, _largest(work.gradient), used
 
 

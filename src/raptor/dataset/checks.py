@@ -3,8 +3,9 @@
 Each check yields faults, one sentence each; a data set without faults yields none.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ FREE = Walls(np.full((3, 3), -1e6), 0.0, 0.0, 1e9, 0.0)  # no walls: the energy 
 
 
 def check(path: Path) -> list[str]:
-    """Check a results folder, a shard, a field stack, or a prediction.
+    """Check a results folder, or any file of one: shard, stack, prediction, table, moulds.
 
     Returns
     -------
@@ -48,13 +49,31 @@ def check(path: Path) -> list[str]:
     path = Path(path)
     if path.is_dir():
         return list(_check_folder(path))
+    if path.suffix == ".geojson":
+        return _fault_of(read_moulds, path)
+    if path.suffix == ".csv":
+        return _fault_of(read_examples if path.name == "examples.csv" else read_design, path)
+    if path.suffix == ".json":
+        return _fault_of(read_scaling, path)
     with open_file(path) as file:
         names = set(file.variables)
     if "row_size" in names:
         return list(check_shard(path))
-    if "fields" in names:
+    if {"fields", "n_cells"} <= names:
         return list(check_stack(path))
-    raise RaptorError(f"{path} is neither a shard nor a field stack; nothing to check")
+    if {"fields", "area_ratio"} <= names:
+        with open_file(path) as file:
+            return [*_check_variables(file, path.name), *_check_field_names(file, path.name)]
+    raise RaptorError(f"{path} is neither a shard nor fields; nothing to check")
+
+
+def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
+    """What reading a file finds wrong with it."""
+    try:
+        read(path)
+    except RaptorError as error:
+        return [str(error)]
+    return []
 
 
 def _check_folder(folder: Path) -> Iterator[str]:
@@ -64,10 +83,10 @@ def _check_folder(folder: Path) -> Iterator[str]:
     runs = read_design(folder / "design" / "design.csv")
     moulds = {mould.name: mould for mould in read_moulds(folder / "design" / "moulds.geojson")}
     yield from check_design(runs, moulds)
+    yield from check_stack(stack)
     with open_file(stack) as file:
         names = str(getattr(file, "shards", "")).split()
     shards = [folder / "simulations" / name for name in names]
-    yield from check_stack(stack)
     yield from check_against_shards(stack, shards, runs, moulds)
     yield from check_examples(folder / "dataset", stack)
 
@@ -92,6 +111,8 @@ def check_shard(path: Path) -> Iterator[str]:
     """Energy and tension recomputed from positions and orientations are the stored ones."""
     try:
         shard = read_shard(path)
+        with open_file(path) as file:
+            yield from _check_variables(file, Path(path).name)
     except RaptorError as error:
         yield str(error)
         return
@@ -123,7 +144,8 @@ def _check_record(record: Record, shard: Shard, file: str) -> Iterator[str]:
 def check_stack(path: Path) -> Iterator[str]:
     """Invariants of fields and masks; no mould, in any of its eight images, in two splits."""
     with open_file(path) as file:
-        yield from _check_names(file, Path(path).name)
+        yield from _check_variables(file, Path(path).name, images=False)
+        yield from _check_field_names(file, Path(path).name)
     table = read_table(path)
     first_seen: dict[bytes, Sample] = {}
     for sample in read_samples(path, range(len(table.split))):
@@ -139,13 +161,27 @@ def check_stack(path: Path) -> Iterator[str]:
                 break
 
 
-def _check_names(file: object, name: str) -> Iterator[str]:
-    variables = getattr(file, "variables")  # noqa: B009  netCDF4 has no types
-    if [str(v) for v in variables["field"][:]] != list(FIELDS):
+def _check_field_names(file: Any, name: str) -> Iterator[str]:
+    if [str(v) for v in file["field"][:]] != list(FIELDS):
         yield f"{name}: the fields are not {', '.join(FIELDS)} in this order"
-    for variable in variables.values():
+
+
+def _check_variables(file: Any, name: str, *, images: bool = True) -> Iterator[str]:
+    """Attributes of the file and its variables, and that every number is finite.
+
+    Without `images` the stack's large variables are left to the check of each sample.
+    """
+    for attribute in ("title", "source", "history", "references", "configuration"):
+        if not hasattr(file, attribute):
+            yield f"{name}: attribute {attribute} is missing"
+    for variable in file.variables.values():
         if not (hasattr(variable, "long_name") and hasattr(variable, "units")):
             yield f"{name}: variable {variable.name} lacks long_name or units"
+        if variable.dtype is not str and (images or variable.ndim < 3):
+            values = variable[:]
+            # A mould without material on its central section has no width ratio.
+            if variable.name != "width_ratio" and not np.isfinite(values).all():
+                yield f"{name}: NaN or infinity in {variable.name}"
 
 
 def _check_fields(sample: Sample, where: str) -> Iterator[str]:
@@ -184,6 +220,7 @@ def check_against_shards(
     by_id = {run.simulation: run for run in runs}
     for missing in sorted(set(by_id) ^ set(rows)):
         yield f"simulation {missing} is in only one of design.csv and {Path(stack).name}"
+    uncovered = set(rows)
     for path in shards:
         try:
             shard = read_shard(path)
@@ -192,12 +229,15 @@ def check_against_shards(
             continue
         for record in shard.records:
             yield from _check_record(record, shard, path.name)
+            uncovered.discard(record.simulation)
             run = by_id.get(record.simulation)
             if record.simulation not in rows or run is None or run.mould not in moulds:
                 yield f"{path.name}: simulation {record.simulation} or its mould is not in the design"
                 continue
             (sample,) = read_samples(stack, [rows[record.simulation]])
             yield from _compare(sample, record, run, moulds[run.mould])
+    for simulation in sorted(uncovered):
+        yield f"simulation {simulation} of {Path(stack).name} is in no readable shard"
 
 
 def _compare(sample: Sample, record: Record, run: Run, mould: Mould) -> Iterator[str]:

@@ -164,8 +164,3 @@ def _run(row: dict[str, str]) -> Run:
     parameters = CellParameters(*(float(row[k]) for k in ("delta", "kappa_nnn", "kappa_nnnn")))
     edge = {"True": True, "False": False}[row["edge"]]
     return Run(int(row["simulation"]), row["mould"], row["split"], edge, parameters, int(row["seed"]))
-
-
-def shard_of(runs: list[Run], shard: int, size: int) -> list[Run]:
-    """The runs of one shard: `size` consecutive simulations, the last shard the rest."""
-    return runs[shard * size : (shard + 1) * size]

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -88,15 +88,11 @@ def read_examples(path: Path) -> list[Example]:
 
 def transform_sample(sample: Sample, element: Element) -> Sample:
     """The image of a sample under an element of D4: fields as tensors, masks as pixels."""
-    return Sample(
-        apply(sample.fields, element),
-        np.ascontiguousarray(move_pixels(sample.depression, element)),
-        np.ascontiguousarray(move_pixels(sample.tethers, element)),
-        sample.parameters,
-        sample.simulation,
-        sample.mould,
-        sample.split,
-        sample.n_cells,
+    return replace(
+        sample,
+        fields=apply(sample.fields, element),
+        depression=np.ascontiguousarray(move_pixels(sample.depression, element)),
+        tethers=np.ascontiguousarray(move_pixels(sample.tethers, element)),
     )
 
 

@@ -56,7 +56,8 @@ def open_file(path: Path) -> Iterator[netCDF4.Dataset]:
         file = netCDF4.Dataset(path)
     except OSError as error:
         raise RaptorError(
-            f"{path} is cut short or not netCDF ({error}); delete it and run the workflow again"
+            f"{path} is cut short or not netCDF ({error}); if the workflow made it, delete it and run "
+            "the workflow again"
         ) from error
     with file:
         file.set_auto_mask(False)

@@ -40,6 +40,7 @@ class Sample:
     mould: str
     split: str
     n_cells: int
+    converged: bool
 
 
 def record_fields(record: Record, pixels: int) -> NDArray[np.float64]:
@@ -95,6 +96,7 @@ def build_stack(
                         run.mould,
                         run.split,
                         len(record.positions),
+                        record.converged,
                     ),
                 )
                 done(row)
@@ -123,13 +125,23 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         "mould": (str, along, "mould id", {}),
         "split": (str, along, "train, validation or test", {}),
         "n_cells": ("i4", along, "number of cells", {}),
+        "converged": ("i1", along, "1 where the simulation met its solver's tolerance", {}),
     }  # fmt: skip
     for name, (kind, dimensions, long_name, options) in columns.items():
         made = file.createVariable(name, cast(Any, kind), dimensions, **options)
         made.long_name, made.units = long_name, "1"
 
     def write(row: int, sample: Sample) -> None:
-        for name in ("fields", "depression", "tethers", "simulation", "mould", "split", "n_cells"):
+        for name in (
+            "fields",
+            "depression",
+            "tethers",
+            "simulation",
+            "mould",
+            "split",
+            "n_cells",
+            "converged",
+        ):
             file[name][row] = getattr(sample, name)
         for name in PARAMETERS:
             file[name][row] = getattr(sample.parameters, name)
@@ -189,4 +201,5 @@ def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
                 str(file["mould"][row]),
                 str(file["split"][row]),
                 int(file["n_cells"][row]),
+                bool(file["converged"][row]),
             )

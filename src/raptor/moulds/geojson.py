@@ -24,7 +24,10 @@ def read_moulds(path: Path) -> list[Mould]:
     path = Path(path)
     if not path.is_file():
         raise RaptorError(f"mould file {path} does not exist; check the path")
-    text = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise RaptorError(f"mould file {path} cannot be read: {error.strerror}") from error
     if not text.strip():
         raise RaptorError(f"mould file {path} is empty; a GeoJSON polygon is expected")
     try:
@@ -45,7 +48,10 @@ def read_moulds(path: Path) -> list[Mould]:
         )
     if not features:
         raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
-    return [_mould(feature, path) for feature in features]
+    try:
+        return [_mould(feature, path) for feature in features]
+    except (AttributeError, TypeError, KeyError, IndexError) as error:
+        raise RaptorError(f"mould file {path} is not GeoJSON of a mould: {error}") from error
 
 
 def read_mould(path: Path) -> Mould:
@@ -108,7 +114,10 @@ def _tether(entry: Any, what: str) -> Tether:
         return PolygonTether(_polygon(entry["polygon"], what))
     if isinstance(entry, dict) and set(entry) == {"x", "y", "radius"}:
         try:
-            return Circle(*(float(entry[key]) for key in ("x", "y", "radius")))
+            values = [float(entry[key]) for key in ("x", "y", "radius")]
+            if not all(map(isfinite, values)):
+                raise ValueError("every one must be finite")
+            return Circle(*values)
         except (TypeError, ValueError) as error:
             raise RaptorError(f"{what}: x, y and radius must be numbers ({error})") from error
     raise RaptorError(f'{what} must be {{"x", "y", "radius"}} or {{"polygon": [[x, y], ...]}}')

@@ -14,7 +14,7 @@ from raptor.errors import RaptorError
 IMAGE_SIZE = 62.5
 """Side of the square image, in l0; its centre is the origin (paper: 256 pixels of 125/512 l0)."""
 
-SYMMETRIES = ("none", "mirror", "mirrors", "half_turn", "square")
+SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
 STRICTLY = 1e-9  # a site this close to a wall does not hold a cell
 CIRCLE_SEGMENTS = 64  # a quarter circle, where a circle must be drawn as a polygon
 
@@ -87,7 +87,7 @@ class Mould:
     tethers : tuple of Tether
         Regions inside it that hold no cells.
     symmetry : str
-        The class that the generator drew from, one of `SYMMETRIES`, or "unknown".
+        The class that the generator drew from, a key of `random_moulds.GROUPS`, or "unknown".
     name : str
         Mould id or file name, for messages.
 
@@ -119,6 +119,10 @@ class Mould:
             if isinstance(tether, Circle) and not tether.radius > 0:
                 raise RaptorError(f"{what} has radius {tether.radius}; it must be positive")
             _validate_polygon(tether.polygon, what)
+            if tether.polygon.buffer(-0.999 * SMALLEST_TETHER).is_empty:
+                raise RaptorError(
+                    f"{what} is too thin to hold cells back; make it at least {2 * SMALLEST_TETHER} l0 across"
+                )
             if not self.outline.covers(tether.polygon.buffer(-1e-3)):
                 raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
         if self.depression.area < 1e-6:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.errors import RaptorError
 from raptor.moulds.geometry import IMAGE_SIZE, STRICTLY, Mould, signed_depth
 
 
@@ -27,7 +28,13 @@ def pixel_centres(pixels: int) -> NDArray[np.float64]:
 
 
 def mould_image(mould: Mould, pixels: int) -> MouldImage:
-    """Masks of a mould: a pixel belongs to what its centre lies in (paper, "Machine Learning")."""
+    """Masks of a mould: a pixel belongs to what its centre lies in (paper, "Machine Learning").
+
+    Raises
+    ------
+    RaptorError
+        Where the depression covers no pixel.
+    """
     centres = pixel_centres(pixels)
     x, y = np.meshgrid(centres, centres)
     points = np.column_stack([x.ravel(), y.ravel()])
@@ -37,4 +44,8 @@ def mould_image(mould: Mould, pixels: int) -> MouldImage:
         tethers |= tether.depth(points) >= -STRICTLY
     tethers &= outline
     depression = outline & ~tethers
+    if not depression.any():
+        raise RaptorError(
+            f"{mould.name} covers no pixel centre of a {pixels} x {pixels} image; draw it larger"
+        )
     return MouldImage(depression.reshape(x.shape), tethers.reshape(x.shape))

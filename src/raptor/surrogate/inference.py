@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
@@ -79,12 +79,18 @@ def save(
     scaling: Scaling,
     layers: int,
     description: dict[str, Any],
+    identity: str,
 ) -> None:
-    """Write weights.safetensors and model.json."""
+    """Write weights.safetensors and model.json; `identity` of the training stands in both."""
     with atomic_path(folder / "weights.safetensors") as temporary:
-        save_file({name: value.contiguous() for name, value in weights.items()}, temporary)
+        save_file(
+            {name: value.contiguous() for name, value in weights.items()},
+            temporary,
+            metadata={"identity": identity},
+        )
     content = {
         **description,
+        "identity": identity,
         "architecture": architecture.as_json(),
         "normalisation": scaling.as_json(),
         "layers": layers,
@@ -111,7 +117,12 @@ def load(folder: Path) -> Surrogate:
         raise RaptorError(f"{folder / 'model.json'} cannot be read: {error}") from error
     generator = Generator(architecture)
     try:
-        generator.load_state_dict(load_file(folder / "weights.safetensors"))
+        weights = folder / "weights.safetensors"
+        with safe_open(weights, framework="pt") as file:
+            identity = (file.metadata() or {}).get("identity")
+        if identity != content.get("identity"):
+            raise RuntimeError("they are of two trainings")
+        generator.load_state_dict(load_file(weights))
     except (OSError, SafetensorError) as error:
         raise RaptorError(f"{folder / 'weights.safetensors'} cannot be read: {error}") from error
     except RuntimeError as error:

@@ -25,7 +25,8 @@ class Architecture:
     dropout : float
         In the three deepest decoder layers (0.5 in pix2pix).
     patch_layers : int
-        Strided layers of the discriminator: 3 see patches of 70 x 70 pixels.
+        Strided layers of the discriminator, fewer on images below 32 pixels: 3 see patches of 70 x
+        70 pixels.
     """
 
     pixels: int
@@ -109,11 +110,12 @@ class Discriminator(nn.Module):
         base = architecture.base_channels
         before = len(INPUTS) + len(FIELDS)
         layers: list[nn.Module] = []
-        for level in range(architecture.patch_layers):
+        strided = min(architecture.patch_layers, int(math.log2(architecture.pixels)) - 2)
+        for level in range(strided):
             after = base * min(2**level, 8)
             layers.append(_Down(before, after, normalise=level > 0, activate=level > 0))
             before = after
-        after = base * min(2**architecture.patch_layers, 8)
+        after = base * min(2**strided, 8)
         layers += [
             nn.LeakyReLU(0.2),
             nn.Conv2d(before, after, 4, padding=1, bias=False),

@@ -18,7 +18,6 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import Scaling
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
-from raptor.metrics import pooled_vrmse
 from raptor.surrogate.losses import discriminator_loss, generator_loss
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
 from raptor.symmetry import FIELDS
@@ -226,15 +225,20 @@ def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> di
 def validation_error(
     generator: Generator, dataset: ExampleSet, batch_size: int, device: torch.device
 ) -> float:
-    """Mean over the fields `SCORED` of the VRMSE of all examples taken together."""
+    """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
+
+    Error and variance are summed over the examples before they are divided: an example in which
+    nothing happens, and whose own variance is next to nothing, does not drown the others.
+    """
     generator.eval()
-    predictions, targets = [], []
+    error, variance = np.zeros(len(SCORED)), np.zeros(len(SCORED))
     with torch.no_grad():
         for inputs, target in DataLoader(dataset, batch_size):
-            predictions.append(generator(inputs.to(device)).cpu().numpy())
-            targets.append(target.numpy())
-    errors = pooled_vrmse(np.concatenate(predictions), np.concatenate(targets))
-    return float(errors[SCORED].mean())
+            predicted = generator(inputs.to(device))[:, SCORED].cpu()
+            wanted = target[:, SCORED]
+            error += ((predicted - wanted) ** 2).mean(dim=(2, 3), dtype=torch.float64).sum(dim=0).numpy()
+            variance += wanted.double().var(dim=(2, 3), correction=0).sum(dim=0).numpy()
+    return float(np.sqrt(error / np.maximum(variance, 1e-12)).mean())
 
 
 def write_history(path: Path, history: pd.DataFrame) -> None:

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from raptor.evaluation import without_sign
+from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse
+from raptor.symmetry import FIELDS
+from raptor.tradeoff import Reference
+
+RNG = np.random.default_rng(0)
+
+
+def test_vrmse_of_the_targets_own_mean_is_one():
+    target = RNG.normal(3, 2, (4, 8, 20, 20))
+    mean = np.broadcast_to(target.mean(axis=(-2, -1), keepdims=True), target.shape)
+    assert vrmse(mean, target) == pytest.approx(1)
+    assert vrmse(target, target) == pytest.approx(0)
+    assert nrmse(np.zeros_like(target), target) == pytest.approx(1)
+
+
+def test_pearson():
+    a = RNG.normal(size=50)
+    assert pearson(a, 2 * a + 1) == pytest.approx(1)
+    assert pearson(a, -a) == pytest.approx(-1)
+    assert np.isnan(pearson(a, np.ones(50)))
+    fields = RNG.normal(size=(8, 5, 5))
+    assert field_pearson(fields, fields) == pytest.approx([1] * 8)
+
+
+def test_bulk_statistics_are_means_over_pixels_and_over_cells():
+    fields = np.zeros((8, 4, 4))
+    fields[0, 0, :2] = 5.0
+    fields[1, 0, 0] = 3.0
+    found = bulk_statistics(fields, 10, 1.0)
+    assert tuple(found) == BULK
+    assert found["P"] == pytest.approx(10 / 16)
+    assert found["N"] == 2
+    assert found["T"] == pytest.approx(3 / 16)
+    assert found["Tbar"] == pytest.approx(3 / 10)  # the mean over cells
+
+
+def test_spontaneous_signs_are_left_out():
+    fields = RNG.normal(size=(8, 3, 3))
+    flipped = fields.copy()
+    flipped[[FIELDS.index("sxsz"), FIELDS.index("sysz")]] *= -1
+    assert np.array_equal(without_sign(fields), without_sign(flipped))
+    assert np.array_equal(without_sign(fields)[:6], fields[:6])
+
+
+def test_the_best_prediction_scores_one_and_another_run_root_two():
+    truth = RNG.normal(size=(8, 1, 1)) * np.ones((8, 100, 100))
+    runs = [truth + 0.3 * RNG.normal(size=truth.shape) for _ in range(6)]
+    reference = Reference(runs[:5], np.zeros(2))
+    assert reference.spread == pytest.approx(0.3, rel=0.02)
+    assert reference.field_error(truth) == pytest.approx(1, rel=0.02)
+    assert reference.field_error(runs[5]) == pytest.approx(np.sqrt(2), rel=0.02)

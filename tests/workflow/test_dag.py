@@ -9,7 +9,7 @@ EVERYTHING = {
     "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
     "augment_dataset", "check_dataset", "write_card", "train_surrogate", "evaluate_surrogate",
     "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
-    "plot_training", "plot_fit", "plot_tradeoff",
+    "plot_training", "plot_fit", "plot_tradeoff", "report",
 }  # fmt: skip
 
 
@@ -28,13 +28,21 @@ def test_a_second_run_has_nothing_to_do(place):
     assert "Nothing to be done" in place.run("--cores", "1").stderr
 
 
+def test_a_lost_report_is_written_again(place):
+    report = place.folder / "results" / "tiny" / "report.html"
+    report.unlink()
+    assert place.jobs() == {"report", "all"}
+    assert place.run("--cores", "1").returncode == 0
+    assert report.stat().st_size > 10**5
+
+
 def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
     tissues = yaml.safe_load((place.folder / "config" / "tissues.yaml").read_text())
     tissues["glial_1"]["area_ratio"] = 0.7
     path = tmp_path / "tissues.yaml"
     path.write_text(yaml.safe_dump(tissues))
     jobs = place.jobs(configuration=variant(tmp_path, fit__tissues_file=str(path)))
-    assert jobs == {"record_configuration", "fit_tissue", "tabulate_fits", "plot_fit", "all"}
+    assert jobs == {"record_configuration", "fit_tissue", "tabulate_fits", "plot_fit", "report", "all"}
 
 
 @pytest.mark.parametrize(
@@ -65,4 +73,4 @@ def test_targets_make_their_part(workplace):
     assert {"fit_tissue", "plot_fit"} <= place.jobs("fit")
     assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
     assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
-    assert place.jobs("report") == EVERYTHING - {"all"} | {"report"}
+    assert place.jobs("report") == EVERYTHING - {"all"}

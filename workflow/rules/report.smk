@@ -5,7 +5,7 @@
 # stamp without its report is dropped, so that a lost report is written again.
 REPORT = Path(RESULTS) / "report.html"
 STAMP = Path(RESULTS) / "report.stamp"
-if STAMP.exists() and not REPORT.exists():
+if STAMP.exists() and not REPORT.exists() and "--report" not in sys.argv:
     STAMP.unlink()
 
 

@@ -33,13 +33,15 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "raptor", "svg.fonttype": "none", "font.size": 9, "axes.titlesize": 9,
     "axes.spines.top": False, "axes.spines.right": False, "figure.dpi": 120, "savefig.dpi": 150,
 }  # fmt: skip
+STYLED = mpl.rc_context(STYLE)
+"""Decorates a function that draws, so that it draws in the house style."""
 HALF = IMAGE_SIZE / 2
 
 
+@STYLED
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, size in inches, in the house style."""
-    with mpl.rc_context(STYLE):
-        return Figure(figsize=(width, height), layout="constrained")
+    """An empty figure, size in inches."""
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def save(figure: Figure, stem: Path) -> None:
@@ -84,6 +86,7 @@ def show_field(axes: Axes, image: NDArray[np.floating], field: str, limit: float
     return shown
 
 
+@STYLED
 def fields_figure(simulated: NDArray[np.floating], predicted: NDArray[np.floating], mould: Mould) -> Figure:
     """The paper's first figure: a mould, and its eight fields (8, y, x) simulated and predicted."""
     figure = new_figure(11.0, 6.4)
@@ -104,6 +107,7 @@ def fields_figure(simulated: NDArray[np.floating], predicted: NDArray[np.floatin
     return figure
 
 
+@STYLED
 def bulk_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
     """The paper's scatter: eight bulk statistics, predicted against simulated, and their r."""
     figure = new_figure(10.5, 5.6)
@@ -125,6 +129,7 @@ def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
     axes.set(xlim=(low - pad, high + pad), ylim=(low - pad, high + pad), box_aspect=1)
 
 
+@STYLED
 def training_figure(history: pd.DataFrame) -> Figure:
     """Losses and validation error, epoch by epoch; the kept weights are marked."""
     figure = new_figure(9.0, 3.0)
@@ -141,6 +146,7 @@ def training_figure(history: pd.DataFrame) -> Figure:
     return figure
 
 
+@STYLED
 def design_figure(design: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
     """Distributions of the parameters and of the moulds, and a few moulds drawn."""
     figure = new_figure(11.0, 6.0)
@@ -161,6 +167,7 @@ def design_figure(design: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
     return figure
 
 
+@STYLED
 def fit_figure(
     mould: Mould,
     densities: Mapping[str, NDArray[np.floating]],
@@ -195,6 +202,7 @@ def fit_figure(
     return figure
 
 
+@STYLED
 def tradeoff_figure(table: pd.DataFrame) -> Figure:
     """Error of the density field against cost, by method: one small point a mould, a large mean."""
     figure = new_figure(6.0, 4.0)
@@ -208,6 +216,7 @@ def tradeoff_figure(table: pd.DataFrame) -> Figure:
         axes.annotate(f"{method}", middle.to_numpy(), xytext=(8, 6), textcoords="offset points", color=colour)
     axes.axhline(1.0, color=THIRD, ls="--", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel="core-seconds a run")
+    axes.margins(x=0.2, y=0.15)
     axes.set_ylabel("density error / seed-to-seed spread")
     return figure
 

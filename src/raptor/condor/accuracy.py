@@ -80,7 +80,7 @@ class Simulation:
     energy, wall_energy : float
         Of the bonds and of the walls, kappa0 l0^2.
     gradient : float
-        Largest component of the gradient left, kappa0 l0.
+        Largest component of the gradient left, by position or by orientation over Delta, kappa0 l0.
     converged : bool
         Whether the gradient fell below the tolerance; never true for a bare anneal.
     folded_fraction : float

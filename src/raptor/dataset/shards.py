@@ -25,8 +25,8 @@ PARAMETERS = {
 RESULTS = {
     "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
     "wall_energy": "energy of the walls, in kappa0 l0^2",
-    "gradient": "largest component of the energy's gradient left, in kappa0 l0",
-    "converged": "1 where the gradient fell below the solver's tolerance",
+    "gradient": "largest gradient left, by position or by orientation over delta, in kappa0 l0",
+    "converged": "1 where the gradient fell below the solver's tolerance times delta",
     "folded_fraction": "share of bonds whose direction reversed since casting",
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",

@@ -11,7 +11,7 @@ from raptor.condor.anneal import anneal
 from raptor.condor.contract import Contraction, contract
 from raptor.condor.energy import cell_tension, folded_fraction
 from raptor.condor.lattice import Lattice, build_lattice
-from raptor.condor.minimise import Minimum
+from raptor.condor.minimise import Minimum, orientation_lever
 from raptor.condor.network import Network, build_network
 from raptor.condor.walls import Walls, build_walls
 from raptor.errors import RaptorError
@@ -49,7 +49,6 @@ class Accuracy:
 
 WARM_TEMPERATURE = 0.012  # kappa0 l0^2, over Delta^2: energies grow as Delta^2
 WARM_FACTOR = 1e4
-SMALLEST_DELTA = 0.02
 
 ACCURACIES: dict[str, Accuracy] = {
     # Largest gradient left, over Delta: 0.03, 0.01, 0.001 kappa0 l0.
@@ -202,7 +201,7 @@ def _solve(
             delta,
             rng,
             sweeps=accuracy.warm_sweeps,
-            initial_temperature=WARM_TEMPERATURE * max(delta, SMALLEST_DELTA) ** 2,
+            initial_temperature=WARM_TEMPERATURE * orientation_lever(delta) ** 2,
             temperature_factor=WARM_FACTOR,
         )
         last = contract(warm.state, network, walls, delta, accuracy.last)

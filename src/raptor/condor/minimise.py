@@ -20,8 +20,7 @@ from raptor.errors import RaptorError
 MEMORY = 8  # pairs of steps that the inverse Hessian is built from
 MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell
 MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
-LEVER = 1.0  # over Delta
-SMALLEST_LEVER = 0.02
+SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
 
@@ -30,8 +29,8 @@ class Minimum(NamedTuple):
     """A minimised state and how it was reached.
 
     `state` as in `energy`, `energy` of the bonds and `walled` of the walls (kappa0 l0^2),
-    `gradient` its largest component (kappa0 l0), `evaluations` of the objective, and whether the
-    gradient fell below the tolerance.
+    `gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
+    `evaluations` of the objective, and whether the gradient fell below the tolerance.
     """
 
     state: NDArray[np.float64]
@@ -194,7 +193,7 @@ def orientation_lever(delta: float) -> float:
     times as stiff as that of moving it. With vectors of length Delta both are equally stiff, and
     forces and torques (per length) both grow as Delta: the scale of the tolerance.
     """
-    return max(LEVER * delta, SMALLEST_LEVER)
+    return max(delta, SMALLEST_LEVER)
 
 
 def minimise(

@@ -84,6 +84,14 @@ def test_nan_is_named(folder):
     assert any("simulation 1: NaN or infinity in sysy" in fault for fault in check(folder))
 
 
+def test_nan_in_what_a_solver_reports_is_named(folder):
+    def spoil(gradient):
+        gradient[0] = np.nan
+
+    edit(folder / "simulations" / "0.nc", "gradient", spoil)
+    assert check(folder) == ["0.nc: NaN or infinity in gradient"]
+
+
 def test_negative_density_lost_cells_and_a_broken_trace_are_named(folder):
     def spoil(fields):
         fields[0, 0] -= 0.1

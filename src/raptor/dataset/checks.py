@@ -222,13 +222,12 @@ def check_against_shards(
         yield f"simulation {missing} is in only one of design.csv and {Path(stack).name}"
     uncovered = set(rows)
     for path in shards:
+        yield from check_shard(path)
         try:
             shard = read_shard(path)
-        except RaptorError as error:
-            yield str(error)
-            continue
+        except RaptorError:
+            continue  # named by check_shard
         for record in shard.records:
-            yield from _check_record(record, shard, path.name)
             uncovered.discard(record.simulation)
             run = by_id.get(record.simulation)
             if record.simulation not in rows or run is None or run.mould not in moulds:

@@ -78,9 +78,9 @@ def test_without_contraction_the_cast_lattice_is_at_rest(lattice, network, walls
 
 
 def test_bonds_pull_and_turn_without_net_force_or_torque(lattice, network, random_state):
-    from raptor.dataset.checks import FREE
+    from raptor.condor.walls import NO_WALLS
 
-    gradient = objective(random_state, network, FREE, 0.6)[2].reshape(6, -1)
+    gradient = objective(random_state, network, NO_WALLS, 0.6)[2].reshape(6, -1)
     blocks = random_state.reshape(6, -1)
     assert gradient[:3].sum(axis=1) == pytest.approx(0, abs=1e-9)
     torque = np.cross(blocks[:3].T, gradient[:3].T) + np.cross(blocks[3:].T, gradient[3:].T)

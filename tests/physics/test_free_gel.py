@@ -9,7 +9,7 @@ from raptor.condor import simulate
 from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.network import build_network
-from raptor.dataset.checks import FREE
+from raptor.condor.walls import NO_WALLS
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
 
@@ -24,7 +24,7 @@ def contracted(parameters, layers, orientation):
 
     def energy(positions, delta):
         state = np.concatenate([positions, held])
-        value, _, gradient = objective(state, network, FREE, delta)
+        value, _, gradient = objective(state, network, NO_WALLS, delta)
         return value, gradient[: len(positions)]
 
     positions = lattice.sites.T.ravel()

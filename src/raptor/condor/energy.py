@@ -10,142 +10,143 @@ along the orientation, whose length does not matter; s and -s are the same cell.
 """
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from raptor.compiled import kernel
-from raptor.condor.lanes import LANES, add_lanes, copy_lanes, subtract_lanes
+from raptor.condor.lanes import lanes, load, sqrt, store, total, where
 from raptor.condor.lattice import Lattice
-from raptor.condor.network import CHUNKS, WIDTH, Network
-from raptor.condor.walls import Walls, wall_energy
+from raptor.condor.network import Network
+from raptor.condor.walls import Walls, near_kernel, wall_energy
 from raptor.errors import RaptorError
 
 SOFTENING = 1e-12  # l0^2, added to |l|^2: two cells on top of each other keep a finite force
-ROWS = 21  # of a block's buffer: 12 read, 9 written
-BUFFER = ROWS * WIDTH
 
 
-def natural_length(rest_length, delta, along_first, along_second):
-    """L': length at which a bond is at rest, given u.s_i and u.s_j (paper, equation 2), l0."""
-    return rest_length * (1 - delta / 2 * (2 - along_first**2 - along_second**2))
+def natural_length(rest_length, delta, squares):
+    """L': length at which a bond is at rest, given (u.s_i)^2 + (u.s_j)^2 (paper, equation 2), l0."""
+    return rest_length * (1 - delta / 2 * (2 - squares))
 
 
 natural_length_kernel = kernel(natural_length)
 
 
-@kernel
-def _block_kernel(b, stiffness, rest, delta):
-    """Energy of the WIDTH bonds in a buffer; writes their forces into it.
+class Scratch(NamedTuple):
+    """Arrays that evaluations work in, to be made once for many: 6 rows with room on both sides.
 
-    Rows of b: positions and orientations of the first cells (0 to 5) and the second (6 to 11);
-    written: dE/dl (12 to 14), dE/ds of the first (15 to 17) and of the second cell (18 to 20).
-    Indices are unsigned: only then does the compiler use vector instructions here.
+    Lanes that hold no bond read, and add zeros, a little before the first cell and after the last.
     """
-    half = 0.5 * rest * delta
-    base = rest * (1.0 - delta)
+
+    unit: NDArray[Any]
+    force: NDArray[Any]
+
+
+def scratch(cells: int, precision: DTypeLike = np.float64) -> Scratch:
+    """Room for evaluations of so many cells."""
+    size = 6 * cells + 2 * lanes(precision)
+    return Scratch(np.zeros(size, precision), np.zeros(size, precision))
+
+
+@kernel
+def _bonds_kernel(cells, network, delta, work):
+    """Energy of all bonds of the unit state; adds -dE/dx and dE/ds of both ends to the forces."""
+    unit, force = work.unit, work.force
+    room = (unit.size - 6 * cells) // 2
+    n = cells
     energy = 0.0
-    w = np.uint64(WIDTH)
-    for lane in range(WIDTH):
-        t = np.uint64(lane)
-        ax, ay, az = b[t + np.uint64(3) * w], b[t + np.uint64(4) * w], b[t + np.uint64(5) * w]
-        cx, cy, cz = b[t + np.uint64(9) * w], b[t + np.uint64(10) * w], b[t + np.uint64(11) * w]
-        lx = b[t + np.uint64(6) * w] - b[t]
-        ly = b[t + np.uint64(7) * w] - b[t + w]
-        lz = b[t + np.uint64(8) * w] - b[t + np.uint64(2) * w]
-        length = math.sqrt(lx * lx + ly * ly + lz * lz + SOFTENING)
-        inverse = 1.0 / length
-        ux, uy, uz = lx * inverse, ly * inverse, lz * inverse
-        first = ux * ax + uy * ay + uz * az
-        second = ux * cx + uy * cy + uz * cz
-        squares = first * first + second * second
-        stretch = length - base - half * squares
-        tension = stiffness[t] * stretch
-        energy += tension * stretch
-        # dL'/du = 2 half (first s_i + second s_j), and du/dl = (1 - u u^T) / |l|.
-        turn = -2.0 * half * tension * inverse
-        along = tension - turn * squares
-        first *= turn
-        second *= turn
-        b[t + np.uint64(12) * w] = along * ux + first * ax + second * cx
-        b[t + np.uint64(13) * w] = along * uy + first * ay + second * cy
-        b[t + np.uint64(14) * w] = along * uz + first * az + second * cz
-        first *= length
-        second *= length
-        b[t + np.uint64(15) * w] = first * ux
-        b[t + np.uint64(16) * w] = first * uy
-        b[t + np.uint64(17) * w] = first * uz
-        b[t + np.uint64(18) * w] = second * ux
-        b[t + np.uint64(19) * w] = second * uy
-        b[t + np.uint64(20) * w] = second * uz
+    for chunk in range(network.first.size):
+        i = network.first[chunk] + room
+        x, y, z = load(unit, i), load(unit, i + n), load(unit, i + 2 * n)
+        ax, ay, az = load(unit, i + 3 * n), load(unit, i + 4 * n), load(unit, i + 5 * n)
+        zero = x * 0.0
+        fx, fy, fz, tx, ty, tz, double = zero, zero, zero, zero, zero, zero, zero
+        for entry in range(network.entries[chunk], network.entries[chunk + 1]):
+            j = network.second[entry] + room
+            kind = network.kind[entry]
+            stiffness = where(network.bits[entry], network.stiffness[kind], x)
+            half = 0.5 * delta * network.rest_length[kind]
+            lx, ly, lz = load(unit, j) - x, load(unit, j + n) - y, load(unit, j + 2 * n) - z
+            bx, by, bz = load(unit, j + 3 * n), load(unit, j + 4 * n), load(unit, j + 5 * n)
+            squared = lx * lx + ly * ly + lz * lz + SOFTENING
+            inverse = 1.0 / sqrt(squared)
+            ux, uy, uz = lx * inverse, ly * inverse, lz * inverse
+            first = ux * ax + uy * ay + uz * az
+            second = ux * bx + uy * by + uz * bz
+            squares = first * first + second * second
+            stretch = squared * inverse - (network.rest_length[kind] - 2.0 * half) - half * squares
+            tension = stiffness * stretch
+            double = double + tension * stretch
+            # dL'/du = 2 half (first s_i + second s_j), and du/dl = (1 - u u^T) / |l|.
+            twist = -2.0 * half * tension
+            turn = twist * inverse
+            along = tension - turn * squares
+            by_first, by_second = turn * first, turn * second
+            px = along * ux + by_first * ax + by_second * bx
+            py = along * uy + by_first * ay + by_second * by
+            pz = along * uz + by_first * az + by_second * bz
+            fx, fy, fz = fx + px, fy + py, fz + pz
+            first, second = first * twist, second * twist
+            tx, ty, tz = tx + first * ux, ty + first * uy, tz + first * uz
+            store(force, j, load(force, j) - px)
+            store(force, j + n, load(force, j + n) - py)
+            store(force, j + 2 * n, load(force, j + 2 * n) - pz)
+            store(force, j + 3 * n, load(force, j + 3 * n) + second * ux)
+            store(force, j + 4 * n, load(force, j + 4 * n) + second * uy)
+            store(force, j + 5 * n, load(force, j + 5 * n) + second * uz)
+        store(force, i, load(force, i) + fx)
+        store(force, i + n, load(force, i + n) + fy)
+        store(force, i + 2 * n, load(force, i + 2 * n) + fz)
+        store(force, i + 3 * n, load(force, i + 3 * n) + tx)
+        store(force, i + 4 * n, load(force, i + 4 * n) + ty)
+        store(force, i + 5 * n, load(force, i + 5 * n) + tz)
+        energy += total(double)
     return 0.5 * energy
 
 
 @kernel
-def _copy_kernel(state, cells, network, block, b):
-    """Copy both ends of a block's bonds into its buffer."""
-    for c in range(CHUNKS):
-        first = network.chunk_first[block * CHUNKS + c]
-        second = network.chunk_second[block * CHUNKS + c]
-        for row in range(6):
-            copy_lanes(b, row * WIDTH + c * LANES, state, row * cells + first)
-            copy_lanes(b, (row + 6) * WIDTH + c * LANES, state, row * cells + second)
-
-
-@kernel
-def _add_kernel(gradient, cells, network, block, b):
-    """Add a block's forces to the gradient of both ends of its bonds."""
-    for c in range(CHUNKS):
-        first = network.chunk_first[block * CHUNKS + c]
-        second = network.chunk_second[block * CHUNKS + c]
-        slot = c * LANES
-        for row in range(3):
-            subtract_lanes(gradient, row * cells + first, b, (row + 12) * WIDTH + slot)
-            add_lanes(gradient, row * cells + second, b, (row + 12) * WIDTH + slot)
-            add_lanes(gradient, (row + 3) * cells + first, b, (row + 15) * WIDTH + slot)
-            add_lanes(gradient, (row + 3) * cells + second, b, (row + 18) * WIDTH + slot)
-
-
-@kernel
-def _objective_kernel(state, gradient, network, walls, delta, unit, force, buffer):
-    """Bond energy and wall energy of a state; fills its gradient.
-
-    `unit` and `force` are scratch, LANES longer than the state: lanes without a bond read and add
-    zeros a little past the last cell.
-    """
-    cells = state.size // 6
-    for i in range(3 * cells):
-        unit[i] = state[i]
-    for i in range(cells):
-        a, b, c = state[3 * cells + i], state[4 * cells + i], state[5 * cells + i]
-        inverse = 1.0 / math.sqrt(a * a + b * b + c * c)
-        unit[3 * cells + i] = a * inverse
-        unit[4 * cells + i] = b * inverse
-        unit[5 * cells + i] = c * inverse
-    force[:] = 0.0
+def _walls_kernel(state, gradient, walls):
+    """Energy of the walls; adds its gradient."""
+    n = state.size // 6
     energy = 0.0
-    for block in range(network.block_rest.size):
-        _copy_kernel(unit, cells, network, block, buffer)
-        lanes = network.stiffness[block * WIDTH : (block + 1) * WIDTH]
-        energy += _block_kernel(buffer, lanes, network.block_rest[block], delta)
-        _add_kernel(force, cells, network, block, buffer)
-    walled = 0.0
-    for i in range(cells):
-        wall, wx, wy, wz = wall_energy(state[i], state[cells + i], state[2 * cells + i], walls)
-        walled += wall
-        gradient[i] = force[i] + wx
-        gradient[cells + i] = force[cells + i] + wy
-        gradient[2 * cells + i] = force[2 * cells + i] + wz
+    for i in range(n):
+        x, y, z = state[i], state[n + i], state[2 * n + i]
+        if near_kernel(x, y, z, walls):
+            wall, along_x, along_y, along_z = wall_energy(x, y, z, walls)
+            energy += wall
+            gradient[i] += along_x
+            gradient[n + i] += along_y
+            gradient[2 * n + i] += along_z
+    return energy
+
+
+@kernel
+def _objective_kernel(state, gradient, network, walls, delta, work):
+    """Bond energy and wall energy of a state; fills its gradient."""
+    n = state.size // 6
+    room = (work.unit.size - 6 * n) // 2
+    unit, force = work.unit[room:], work.force[room:]
+    work.force[:] = 0
+    for i in range(3 * n):
+        unit[i] = state[i]
+    for i in range(3 * n, 4 * n):
+        a, b, c = state[i], state[i + n], state[i + 2 * n]
+        length = math.sqrt(a * a + b * b + c * c)
+        unit[i], unit[i + n], unit[i + 2 * n] = a / length, b / length, c / length
+    energy = _bonds_kernel(n, network, delta, work)
+    for i in range(3 * n):
+        gradient[i] = -force[i]
+    for i in range(3 * n, 4 * n):
         # dE/ds of a unit vector, as seen by a vector of any length along it.
-        a, b, c = unit[3 * cells + i], unit[4 * cells + i], unit[5 * cells + i]
-        ga, gb, gc = force[3 * cells + i], force[4 * cells + i], force[5 * cells + i]
+        a, b, c = unit[i], unit[i + n], unit[i + 2 * n]
+        ga, gb, gc = force[i], force[i + n], force[i + 2 * n]
         along = ga * a + gb * b + gc * c
-        x, y, z = state[3 * cells + i], state[4 * cells + i], state[5 * cells + i]
-        inverse = 1.0 / (a * x + b * y + c * z)
-        gradient[3 * cells + i] = (ga - along * a) * inverse
-        gradient[4 * cells + i] = (gb - along * b) * inverse
-        gradient[5 * cells + i] = (gc - along * c) * inverse
-    return energy, walled
+        length = a * state[i] + b * state[i + n] + c * state[i + 2 * n]
+        gradient[i] = (ga - along * a) / length
+        gradient[i + n] = (gb - along * b) / length
+        gradient[i + 2 * n] = (gc - along * c) / length
+    return energy, _walls_kernel(state, gradient, walls)
 
 
 @kernel
@@ -163,15 +164,11 @@ def _stretch_kernel(state, first, second, stiffness, rest, delta, hooke, tension
             u = (state[c * cells + j] - state[c * cells + i]) / length
             along_first += u * state[(c + 3) * cells + i]
             along_second += u * state[(c + 3) * cells + j]
-        natural = natural_length_kernel(rest[bond], delta, along_first, along_second)
+        squares = along_first * along_first + along_second * along_second
+        natural = natural_length_kernel(rest[bond], delta, squares)
         value = stiffness[bond] * (length - natural if hooke else natural)
         tension[i] += value
         tension[j] += value
-
-
-def scratch(cells: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Arrays that one evaluation works in, to be made once for many."""
-    return np.zeros(6 * cells + LANES), np.zeros(6 * cells + LANES), np.zeros(BUFFER)
 
 
 def objective(
@@ -189,13 +186,13 @@ def objective(
     RaptorError
         Where the state does not fit the network or holds an orientation of length zero.
     """
-    cells = len(network.start) - 1
+    cells = network.cells
     if state.shape != (6 * cells,):
         raise RaptorError(f"state has shape {state.shape}; (6 * {cells},) is expected")
     if (np.linalg.norm(state[3 * cells :].reshape(3, -1), axis=0) == 0).any():
         raise RaptorError("a cell's orientation has length zero; give each a direction")
     gradient = np.empty_like(state)
-    energy, walled = _objective_kernel(state, gradient, network, walls, delta, *scratch(cells))
+    energy, walled = _objective_kernel(state, gradient, network, walls, delta, scratch(cells, state.dtype))
     return float(energy), float(walled), gradient
 
 

@@ -1,69 +1,195 @@
-"""Moves of LANES consecutive numbers at once.
+"""A vector register as a number: `Lanes` of float64 or float32 that kernels add and multiply.
 
-Written as loops, the compiler must assume that the arrays overlap and moves one number at a time,
-which halves the speed of the whole simulator; so each move is stated as one vector instruction.
-Without compilation the plain Python body runs.
+Written as loops over arrays, the compiler must assume that arrays overlap and moves one number at a
+time. A kernel that loads, computes and stores whole lanes says what it means, keeps every sum in
+a register, and reads as the formula does. Without compilation lanes are short NumPy arrays.
 """
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba.core import types
-from numba.extending import intrinsic, overload
-from numpy.typing import NDArray
+from numba.core import cgutils, types
+from numba.extending import intrinsic, models, overload, register_model
+from numpy.typing import DTypeLike, NDArray
 
-LANES = 8
-"""Numbers of a move: one 512-bit register of float64; narrower machines split it."""
-
-
-def copy_lanes(target: NDArray[Any], i: int, source: NDArray[Any], j: int) -> None:
-    """target[i + t] = source[j + t] for each lane t."""
-    target[i : i + LANES] = source[j : j + LANES]
+REGISTER = 64
+"""Bytes of a 512-bit register; narrower machines take two or four instructions for one."""
 
 
-def add_lanes(target: NDArray[Any], i: int, source: NDArray[Any], j: int) -> None:
-    """target[i + t] += source[j + t] for each lane t."""
-    target[i : i + LANES] += source[j : j + LANES]
+def lanes(precision: DTypeLike) -> int:
+    """Numbers of a precision that one register holds."""
+    return REGISTER // np.dtype(precision).itemsize
 
 
-def subtract_lanes(target: NDArray[Any], i: int, source: NDArray[Any], j: int) -> None:
-    """target[i + t] -= source[j + t] for each lane t."""
-    target[i : i + LANES] -= source[j : j + LANES]
+def load(array: NDArray[Any], i: int) -> Any:
+    """The lanes array[i], array[i + 1] and so on."""
+    return array[i : i + lanes(array.dtype)].copy()
 
 
-def _as_instruction(move: Callable[..., None], operation: str | None) -> None:
-    """Give a move its compiled form: load, at most one arithmetic operation, store."""
+def store(array: NDArray[Any], i: int, value: Any) -> None:
+    """array[i + t] = value[t] for each lane t."""
+    array[i : i + lanes(array.dtype)] = value
+
+
+def sqrt(value: Any) -> Any:
+    """Square root of each lane."""
+    return np.sqrt(value)
+
+
+def total(value: Any) -> float:
+    """Sum of all lanes, float64."""
+    return float(np.sum(value, dtype=np.float64))
+
+
+def where(bits: int, number: float, like: Any) -> Any:
+    """Lanes of a number where the mask `bits` has a one, of zero elsewhere."""
+    held = (int(bits) >> np.arange(len(like))) & 1
+    return (held * number).astype(like.dtype)
+
+
+class _LanesType(types.Type):
+    """Numba's type of one register full of a scalar."""
+
+    def __init__(self, scalar):
+        self.scalar = scalar
+        self.count = REGISTER * 8 // scalar.bitwidth
+        super().__init__(name=f"Lanes({scalar})")
+
+
+@register_model(_LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]  # Numba is untyped
+    def __init__(self, manager, kind):
+        vector = ir.VectorType(manager[kind.scalar].get_value_type(), kind.count)
+        super().__init__(manager, kind, vector)
+
+
+def _spread(context, builder, value, kind, lanes_kind):
+    """A number in every lane; lanes as they are."""
+    if isinstance(kind, _LanesType):
+        return value
+    vector = context.get_value_type(lanes_kind)
+    number = context.cast(builder, value, kind, lanes_kind.scalar)
+    index = ir.IntType(32)
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, index(0))
+    everywhere = ir.Constant(ir.VectorType(index, lanes_kind.count), [0] * lanes_kind.count)
+    return builder.shuffle_vector(one, one, everywhere)
+
+
+def _pointer(context, builder, kind, array, index):
+    data = context.make_array(kind)(context, builder, array).data
+    vector = context.get_value_type(_LanesType(kind.dtype))
+    return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+
+
+@intrinsic
+def _load(typing, array, i):
+    def generate(context, builder, signature, arguments):
+        place = _pointer(context, builder, array, *arguments)
+        return builder.load(place, align=array.dtype.bitwidth // 8)
+
+    return _LanesType(array.dtype)(array, i), generate
+
+
+@intrinsic
+def _store(typing, array, i, value):
+    def generate(context, builder, signature, arguments):
+        place = _pointer(context, builder, array, *arguments[:2])
+        builder.store(arguments[2], place, align=array.dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.none(array, i, value), generate
+
+
+@intrinsic
+def _sqrt(typing, value):
+    def generate(context, builder, signature, arguments):
+        vector = arguments[0].type
+        name = f"llvm.sqrt.v{value.count}f{value.scalar.bitwidth}"
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(vector, [vector]), name
+        )
+        return builder.call(function, arguments)
+
+    return value(value), generate
+
+
+@intrinsic
+def _total(typing, value):
+    def generate(context, builder, signature, arguments):
+        number = context.get_value_type(value.scalar)
+        name = f"llvm.vector.reduce.fadd.v{value.count}f{value.scalar.bitwidth}"
+        kind = ir.FunctionType(number, [number, arguments[0].type])
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        found = builder.call(function, [ir.Constant(number, 0.0), arguments[0]])
+        return context.cast(builder, found, value.scalar, types.float64)
+
+    return types.float64(value), generate
+
+
+@intrinsic
+def _where(typing, bits, number, like):
+    def generate(context, builder, signature, arguments):
+        mask_bits = ir.IntType(like.count)
+        mask = arguments[0]
+        if mask.type.width != like.count:
+            mask = (builder.trunc if mask.type.width > like.count else builder.zext)(mask, mask_bits)
+        mask = builder.bitcast(mask, ir.VectorType(ir.IntType(1), like.count))
+        numbers = _spread(context, builder, arguments[1], number, like)
+        return builder.select(mask, numbers, ir.Constant(numbers.type, [0.0] * like.count))
+
+    return like(bits, number, like), generate
+
+
+@overload(load)
+def _compiled_load(array, i):
+    return lambda array, i: _load(array, np.intp(i))
+
+
+@overload(store)
+def _compiled_store(array, i, value):
+    return lambda array, i, value: _store(array, np.intp(i), value)
+
+
+@overload(sqrt)
+def _compiled_sqrt(value):
+    return lambda value: _sqrt(value)
+
+
+@overload(total)
+def _compiled_total(value):
+    return lambda value: _total(value)
+
+
+@overload(where)
+def _compiled_where(bits, number, like):
+    return lambda bits, number, like: _where(bits, number, like)
+
+
+def _give_arithmetic(operation: Callable[..., Any], instruction: str) -> None:
+    """Let an operator take lanes with lanes, and lanes with numbers, which it spreads."""
 
     @intrinsic
-    def instruction(context, target, i, source, j):
+    def compute(typing, a, b):
+        kind = a if isinstance(a, _LanesType) else b
+
         def generate(context, builder, signature, arguments):
-            def pointer(array, kind, index):
-                data = context.make_array(kind)(context, builder, array).data
-                element = context.get_data_type(kind.dtype)
-                place = builder.gep(data, [index])
-                size = np.dtype(str(kind.dtype)).itemsize
-                return builder.bitcast(place, ir.VectorType(element, LANES).as_pointer()), size
+            operands = zip(arguments, signature.args, strict=True)
+            vectors = [_spread(context, builder, value, type_, kind) for value, type_ in operands]
+            return getattr(builder, instruction)(*vectors)
 
-            to_, size = pointer(arguments[0], signature.args[0], arguments[1])
-            from_, _ = pointer(arguments[2], signature.args[2], arguments[3])
-            value = builder.load(from_, align=size)
-            if operation is not None:
-                value = getattr(builder, operation)(builder.load(to_, align=size), value)
-            builder.store(value, to_, align=size)
-            return context.get_dummy_value()
+        return kind(a, b), generate
 
-        return types.none(target, i, source, j), generate
-
-    @overload(move)
-    def _compiled(target, i, source, j):
-        def move_lanes(target, i, source, j):
-            instruction(target, np.intp(i), source, np.intp(j))  # type: ignore[call-arg]  # Numba passes the context
-
-        return move_lanes
+    @overload(operation)
+    def _compiled(a, b):
+        if isinstance(a, _LanesType) or isinstance(b, _LanesType):
+            return lambda a, b: compute(a, b)
+        return None
 
 
-_as_instruction(copy_lanes, None)
-_as_instruction(add_lanes, "fadd")
-_as_instruction(subtract_lanes, "fsub")
+_give_arithmetic(operator.add, "fadd")
+_give_arithmetic(operator.sub, "fsub")
+_give_arithmetic(operator.mul, "fmul")
+_give_arithmetic(operator.truediv, "fdiv")

@@ -1,18 +1,20 @@
 """Minimisation of positions and orientations together: limited-memory BFGS, compiled whole.
 
-Reference: J. Nocedal and S. Wright, Numerical Optimization, algorithms 7.4 and 7.5. Steps are
-bounded, so that no cell jumps through a wall or its neighbours, and the objective (bonds and
-walls) never rises over accepted steps.
+Reference: J. Nocedal and S. Wright, Numerical Optimization, algorithms 7.4 and 7.5, with the
+two-loop recursion done on the dot products of the stored vectors (W. Chen, Z. Wang, J. Zhou,
+Large-scale L-BFGS using MapReduce, NIPS 2014): each stored vector is read twice a step instead of
+four times, and stored in single precision. Steps are bounded, so that no cell jumps through a wall
+or its neighbours, and the objective (bonds and walls) never rises over accepted steps.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raptor.compiled import kernel
-from raptor.condor.energy import _objective_kernel, scratch, unit_orientations
+from raptor.condor.energy import Scratch, _objective_kernel, scratch, unit_orientations
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls
 from raptor.errors import RaptorError
@@ -23,6 +25,7 @@ MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
 SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
+BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the innermost cache
 
 
 class Minimum(NamedTuple):
@@ -33,7 +36,7 @@ class Minimum(NamedTuple):
     `evaluations` of the objective, and whether the gradient fell below the tolerance.
     """
 
-    state: NDArray[np.float64]
+    state: NDArray[Any]
     energy: float
     walled: float
     gradient: float
@@ -42,18 +45,23 @@ class Minimum(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Arrays that one minimisation works in."""
+    """Arrays that one minimisation works in.
 
-    gradient: NDArray[np.float64]
-    trial: NDArray[np.float64]
-    trial_gradient: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    steps: NDArray[np.float64]
-    changes: NDArray[np.float64]
-    curvature: NDArray[np.float64]
-    unit: NDArray[np.float64]
-    force: NDArray[np.float64]
-    buffer: NDArray[np.float64]
+    Of pair p of the memory: `steps[p]` s_p and `changes[p]` y_p of state and gradient; `sy[p, q]`
+    s_p.y_q, `yy[p, q]` y_p.y_q, `sg[p]` s_p.g and `yg[p]` y_p.g.
+    """
+
+    gradient: NDArray[Any]
+    trial: NDArray[Any]
+    trial_gradient: NDArray[Any]
+    direction: NDArray[Any]
+    steps: NDArray[np.float32]
+    changes: NDArray[np.float32]
+    sy: NDArray[np.float64]
+    yy: NDArray[np.float64]
+    sg: NDArray[np.float64]
+    yg: NDArray[np.float64]
+    scratch: Scratch
 
 
 @kernel
@@ -66,7 +74,7 @@ def _dot(a, b):
 
 @kernel
 def _largest(a):
-    value = 0.0
+    value = a[0] * 0
     for i in range(a.size):
         value = max(value, abs(a[i]))
     return value
@@ -78,35 +86,83 @@ def _longest_step(direction, lever):
     half = direction.size // 2
     move = _largest(direction[:half])
     turn = _largest(direction[half:]) / lever
-    return min(MAX_STEP / max(move, 1e-300), MAX_TURN / max(turn, 1e-300))
+    return min(MAX_STEP / max(move, 1e-30), MAX_TURN / max(turn, 1e-30))
+
+
+@kernel
+def _remember_kernel(state, work, slot, stored):
+    """Go to the trial state, and store the step that led there as pair `slot`."""
+    work.sg[:] = 0.0
+    work.yg[:] = 0.0
+    work.sy[slot, :] = 0.0
+    work.sy[:, slot] = 0.0
+    work.yy[slot, :] = 0.0
+    work.yy[:, slot] = 0.0
+    for start in range(0, state.size, BLOCK):
+        end = min(start + BLOCK, state.size)
+        s, y = work.steps[slot, start:end], work.changes[slot, start:end]
+        x, g = state[start:end], work.gradient[start:end]
+        new_x, new_g = work.trial[start:end], work.trial_gradient[start:end]
+        for i in range(end - start):
+            s[i] = new_x[i] - x[i]
+            y[i] = new_g[i] - g[i]
+            x[i] = new_x[i]
+            g[i] = new_g[i]
+        for p in range(stored):
+            sp, yp = work.steps[p, start:end], work.changes[p, start:end]
+            sg = yg = sy = ys = yy = 0.0
+            for i in range(end - start):
+                sg += sp[i] * g[i]
+                yg += yp[i] * g[i]
+                sy += sp[i] * y[i]
+                ys += yp[i] * s[i]
+                yy += yp[i] * y[i]
+            work.sg[p] += sg
+            work.yg[p] += yg
+            work.sy[p, slot] += sy
+            if p != slot:
+                work.sy[slot, p] += ys
+            work.yy[p, slot] += yy
+    work.yy[slot, :] = work.yy[:, slot]
 
 
 @kernel
 def _direction_kernel(work, stored, newest):
-    """Two-loop recursion: direction = - (inverse Hessian) gradient."""
-    d = work.direction
-    d[:] = work.gradient
-    alpha = np.zeros(work.curvature.size)
-    memory = work.curvature.size
+    """Two-loop recursion: direction = - (inverse Hessian) gradient; returns its slope."""
+    memory = work.sg.size
+    on_s, on_y = np.zeros(memory), np.zeros(memory)
+    alpha = np.zeros(memory)
+    scale = 1.0
     for back in range(stored):
         p = (newest - back) % memory
-        alpha[p] = _dot(work.steps[p], d) / work.curvature[p]
-        a, change = alpha[p], work.changes[p]
-        for i in range(d.size):
-            d[i] -= a * change[i]
+        along = work.sg[p]
+        for q in range(memory):
+            along -= alpha[q] * work.sy[p, q]
+        alpha[p] = along / work.sy[p, p]
     if stored > 0:
-        change = work.changes[newest]
-        scale = work.curvature[newest] / _dot(change, change)
-        for i in range(d.size):
-            d[i] *= scale
+        scale = work.sy[newest, newest] / work.yy[newest, newest]
+    for p in range(memory):
+        on_y[p] = -scale * alpha[p]
     for back in range(stored - 1, -1, -1):
         p = (newest - back) % memory
-        a = alpha[p] - _dot(work.changes[p], d) / work.curvature[p]
-        step = work.steps[p]
-        for i in range(d.size):
-            d[i] += a * step[i]
-    for i in range(d.size):
-        d[i] = -d[i]
+        along = scale * work.yg[p]
+        for q in range(memory):
+            along += on_y[q] * work.yy[q, p] + on_s[q] * work.sy[q, p]
+        on_s[p] = alpha[p] - along / work.sy[p, p]
+    slope = 0.0
+    for start in range(0, work.direction.size, BLOCK):
+        end = min(start + BLOCK, work.direction.size)
+        d, g = work.direction[start:end], work.gradient[start:end]
+        for i in range(end - start):
+            d[i] = -scale * g[i]
+        for back in range(stored):
+            p = (newest - back) % memory
+            s, y = work.steps[p, start:end], work.changes[p, start:end]
+            a, b = on_s[p], on_y[p]
+            for i in range(end - start):
+                d[i] -= a * s[i] + b * y[i]
+        slope += _dot(d, g)
+    return slope
 
 
 @kernel
@@ -123,9 +179,7 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
             network,
             walls,
             delta,
-            work.unit,
-            work.force,
-            work.buffer,
+            work.scratch,
         )
         used += 1
         value = energy + walled
@@ -141,19 +195,17 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
 def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(
-        state, work.gradient, network, walls, delta, work.unit, work.force, work.buffer
+        state, work.gradient, network, walls, delta, work.scratch
     )
     used = 1
     stored = 0
     newest = -1
-    memory = work.curvature.size
+    memory = work.sg.size
     while used < limit and _largest(work.gradient) > tolerance:
-        _direction_kernel(work, stored, newest)
-        slope = _dot(work.direction, work.gradient)
+        slope = _direction_kernel(work, stored, newest)
         if slope >= 0.0:
             stored = 0
-            _direction_kernel(work, stored, newest)
-            slope = _dot(work.direction, work.gradient)
+            slope = _direction_kernel(work, stored, newest)
         length = min(1.0, _longest_step(work.direction, lever))
         if stored == 0:
             length = min(length, 0.1 * _longest_step(work.direction, lever))
@@ -166,19 +218,12 @@ def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work
                 break  # as low as rounding allows
             stored = 0
             continue
+        if stored == 0:
+            newest = -1
         slot = (newest + 1) % memory
-        curvature = 0.0
-        for i in range(state.size):
-            step = work.trial[i] - state[i]
-            change = work.trial_gradient[i] - work.gradient[i]
-            work.steps[slot, i] = step
-            work.changes[slot, i] = change
-            curvature += step * change
-            state[i] = work.trial[i]
-            work.gradient[i] = work.trial_gradient[i]
+        _remember_kernel(state, work, slot, min(memory, max(stored, slot + 1)))
         energy, walled = new_energy, new_walled
-        if curvature > 1e-10 * _dot(work.changes[slot], work.changes[slot]):
-            work.curvature[slot] = curvature
+        if work.sy[slot, slot] > 1e-10 * work.yy[slot, slot]:
             newest = slot
             stored = min(stored + 1, memory)
         else:
@@ -197,7 +242,7 @@ def orientation_lever(delta: float) -> float:
 
 
 def minimise(
-    state: NDArray[np.float64],
+    state: NDArray[Any],
     network: Network,
     walls: Walls,
     delta: float,
@@ -220,23 +265,23 @@ def minimise(
     RaptorError
         Where the state does not fit the network or is not finite.
     """
-    if state.size != 6 * (len(network.start) - 1) or not np.isfinite(state).all():
+    if state.size != 6 * network.cells or not np.isfinite(state).all():
         raise RaptorError("the state to minimise does not fit the network, or is not finite")
     state = unit_orientations(state)
     lever = orientation_lever(delta)
     state[state.size // 2 :] *= lever
-    unit, force, buffer = scratch(state.size // 6)
     work = _Work(
         gradient=np.empty_like(state),
         trial=np.empty_like(state),
         trial_gradient=np.empty_like(state),
         direction=np.empty_like(state),
-        steps=np.zeros((MEMORY, state.size)),
-        changes=np.zeros((MEMORY, state.size)),
-        curvature=np.zeros(MEMORY),
-        unit=unit,
-        force=force,
-        buffer=buffer,
+        steps=np.zeros((MEMORY, state.size), np.float32),
+        changes=np.zeros((MEMORY, state.size), np.float32),
+        sy=np.zeros((MEMORY, MEMORY)),
+        yy=np.zeros((MEMORY, MEMORY)),
+        sg=np.zeros(MEMORY),
+        yg=np.zeros(MEMORY),
+        scratch=scratch(state.size // 6, state.dtype),
     )
     energy, walled, gradient, used = _minimise_kernel(
         state, network, walls, delta, lever, tolerance * lever, limit, work

@@ -1,92 +1,110 @@
-"""The lattice's bonds laid out for the processor.
+"""The lattice's bonds laid out for the processor's vector registers.
 
-Cells are ordered by layer, row and column, so bonds of one direction mostly join consecutive cells
-to consecutive cells. They are cut into chunks of `LANES`: bond t of a chunk joins cells
-`first + t` and `second + t`, and a lane that holds no bond has no stiffness. A kernel copies
-`CHUNKS` chunks into a small buffer with contiguous reads, evaluates all their bonds with vector
-instructions, and adds the forces back, each bond once. The buffer stays in the innermost cache.
+Cells are ordered by layer, row and column, so neighbours of consecutive cells are mostly
+consecutive cells. A **chunk** is a run of cells that fills one register; an **entry** of a chunk
+is one register full of bonds, from cells `first` + t of the chunk to cells `second` + t, of one
+kind (spring constant and rest length), with a bit for each lane t that does hold a bond. A kernel
+keeps a chunk's cells in registers and goes through its entries; nothing is gathered one by one.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from raptor.condor.lanes import LANES
+from raptor.condor.lanes import lanes
 from raptor.condor.lattice import Lattice
-
-CHUNKS = 16  # chunks of a block
-WIDTH = LANES * CHUNKS  # bonds of a block
 
 
 class Network(NamedTuple):
-    """Bonds in blocks of chunks, and the same bonds as a table of neighbours.
+    """Bonds in chunks and entries.
 
-    Chunk c joins cells `chunk_first[c]` + t and `chunk_second[c]` + t with spring constants
-    `stiffness[c * LANES + t]` (kappa0). Block b is chunks b * CHUNKS and following, of one rest length
-    `block_rest[b]` (l0). The neighbours of cell i are entries `start[i]` to `start[i + 1]` of
-    `neighbour`, `neighbour_stiffness` and `neighbour_rest`.
+    Chunk c is cells `first[c]` to `first[c]` + `filled[c]`; its entries are `entries[c]` to
+    `entries[c + 1]` of `second` (a cell, less than zero where low lanes hold no bond), `bits`
+    and `kind`; bonds of a kind have `stiffness[kind]` (kappa0) and `rest_length[kind]` (l0).
     """
 
-    chunk_first: NDArray[np.int64]
-    chunk_second: NDArray[np.int64]
-    stiffness: NDArray[np.float64]
-    block_rest: NDArray[np.float64]
-    start: NDArray[np.int64]
-    neighbour: NDArray[np.int32]
-    neighbour_stiffness: NDArray[np.float64]
-    neighbour_rest: NDArray[np.float64]
+    first: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    entries: NDArray[np.int64]
+    second: NDArray[np.int32]
+    bits: NDArray[np.uint16]
+    kind: NDArray[np.int16]
+    stiffness: NDArray[Any]
+    rest_length: NDArray[Any]
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return int(self.first[-1] + self.filled[-1])
 
 
-def build_network(lattice: Lattice) -> Network:
-    """Lay out a lattice's bonds."""
-    return Network(*_blocks(lattice), *_neighbours(lattice))
+def build_network(lattice: Lattice, precision: DTypeLike = np.float64) -> Network:
+    """Lay out a lattice for its energy and gradient: each bond once, cells as in the lattice."""
+    cells = np.arange(lattice.cells)
+    low = np.minimum(lattice.first, lattice.second)
+    high = np.maximum(lattice.first, lattice.second)
+    return _layout(lattice, cells, _row(lattice), (low, high), precision)
 
 
-def _blocks(lattice: Lattice) -> tuple[NDArray[Any], ...]:
-    """Chunks of consecutive bonds, filled up to whole blocks of one rest length."""
-    parts = [
-        _chunks(lattice, np.flatnonzero(lattice.rest_length == rest))
-        for rest in np.unique(lattice.rest_length)
-    ]
-    empty: NDArray[np.int64] = np.empty(0, np.int64)
-    return (
-        np.concatenate([empty, *(part[0] for part in parts)]),
-        np.concatenate([empty, *(part[1] for part in parts)]),
-        np.concatenate([np.empty(0), *(part[2].ravel() for part in parts)]),
-        np.repeat(np.unique(lattice.rest_length), [len(part[0]) // CHUNKS for part in parts]),
-    )
+def build_sublattices(
+    lattice: Lattice, precision: DTypeLike = np.float64
+) -> tuple[NDArray[np.int64], Network]:
+    """Lay out a lattice for trial moves: no two cells of a chunk share a bond.
+
+    Each row of cells is taken apart into two or three interleaved sublattices. Returns the order
+    of the cells, (cells,) numbers in the lattice, and the network of the cells so ordered, which
+    holds each bond from both its ends.
+    """
+    row = _row(lattice)
+    same = row[lattice.first] == row[lattice.second]
+    reach = np.abs(lattice.sites[lattice.first, 0] - lattice.sites[lattice.second, 0])[same]
+    apart = 1 + int(reach.max(initial=0) + 0.5)  # sublattices of a row
+    group = row * apart + np.floor(lattice.sites[:, 0]).astype(np.int64) % apart
+    order = np.argsort(group, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(lattice.cells)
+    first, second = rank[lattice.first], rank[lattice.second]
+    ends = np.concatenate([first, second]), np.concatenate([second, first])
+    return order, _layout(lattice, order, group, ends, precision)
 
 
-def _chunks(lattice: Lattice, bonds: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
-    """First cells, second cells and lane stiffness of the chunks that hold some bonds."""
-    first = lattice.first[bonds].astype(np.int64)
-    second = lattice.second[bonds].astype(np.int64)
-    number = np.arange(len(bonds))
-    opens_run = np.ones(len(bonds), dtype=bool)
-    opens_run[1:] = (np.diff(first) != 1) | (np.diff(second) != 1)
-    place = number - np.maximum.accumulate(np.where(opens_run, number, 0))
-    lane = place % LANES
+def _row(lattice: Lattice) -> NDArray[np.int64]:
+    """Number of the row that each cell was cast in."""
+    changes = np.diff(lattice.sites[:, 1:], axis=0).any(axis=1)
+    return np.concatenate([[0], np.cumsum(changes)])
+
+
+def _layout(
+    lattice: Lattice,
+    order: NDArray[np.int64],
+    group: NDArray[np.int64],
+    ends: tuple[NDArray[Any], NDArray[Any]],
+    precision: DTypeLike,
+) -> Network:
+    """Cut ordered cells into chunks where their group changes, and collect bonds into entries."""
+    cell, other = ends
+    number = np.arange(lattice.cells)
+    opens_group = np.diff(group[order], prepend=-1) != 0
+    lane = (number - np.maximum.accumulate(np.where(opens_group, number, 0))) % lanes(precision)
     chunk = np.cumsum(lane == 0) - 1
-    opens_chunk = lane == 0
-    count = -(-int(opens_chunk.sum()) // CHUNKS) * CHUNKS
-    chunk_first, chunk_second = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    chunk_first[: chunk[-1] + 1] = first[opens_chunk]
-    chunk_second[: chunk[-1] + 1] = second[opens_chunk]
-    stiffness = np.zeros((count, LANES))
-    stiffness[chunk, lane] = lattice.stiffness[bonds]
-    return chunk_first, chunk_second, stiffness
-
-
-def _neighbours(lattice: Lattice) -> tuple[NDArray[Any], ...]:
-    cell = np.concatenate([lattice.first, lattice.second])
-    other = np.concatenate([lattice.second, lattice.first])
-    order = np.lexsort((other, cell))
-    start = np.zeros(lattice.cells + 1, dtype=np.int64)
-    start[1:] = np.cumsum(np.bincount(cell, minlength=lattice.cells))
-    return (
-        start,
-        other[order].astype(np.int32),
-        np.tile(lattice.stiffness, 2)[order],
-        np.tile(lattice.rest_length, 2)[order],
+    first = np.flatnonzero(lane == 0)
+    rests, index, kind = np.unique(lattice.rest_length, return_index=True, return_inverse=True)
+    kind = np.tile(kind, 1 + (len(cell) > lattice.bonds))
+    # One number for chunk, kind and second cell: much faster to sort than rows of three.
+    span, reach = lattice.cells + lanes(precision), lanes(precision)
+    keys = (chunk[cell] * max(1, len(rests)) + kind) * span + (other - lane[cell] + reach)
+    keys, entry = np.unique(keys, return_inverse=True)
+    bits = np.zeros(len(keys), np.uint16)
+    np.bitwise_or.at(bits, entry, (1 << lane[cell]).astype(np.uint16))
+    owner, kind = np.divmod(keys // span, max(1, len(rests)))
+    return Network(
+        first=first.astype(np.int32),
+        filled=np.diff(first, append=lattice.cells).astype(np.int32),
+        entries=np.searchsorted(owner, np.arange(len(first) + 1)),
+        second=(keys % span - reach).astype(np.int32),
+        bits=bits,
+        kind=kind.astype(np.int16),
+        stiffness=lattice.stiffness[index].astype(precision),
+        rest_length=rests.astype(precision),
     )

@@ -20,13 +20,21 @@ STIFFNESS = 100.0  # kappa0; a few times the stiffness that all of a cell's bond
 
 
 class Walls(NamedTuple):
-    """A table of depths (rows in y, columns in x), its origin, and the vertical bounds, l0."""
+    """A table of depths (rows in y, columns in x), its origin, and the vertical bounds, l0.
+
+    `near` tells, square by square of the table, whether a wall could be within reach.
+    """
 
     depth: NDArray[np.float64]
+    near: NDArray[np.uint8]
     x0: float
     y0: float
     height: float
     stiffness: float
+
+
+NO_WALLS = Walls(np.full((3, 3), -1e6), np.zeros((3, 3), np.uint8), 0.0, 0.0, 1e9, 0.0)
+"""For the energy of bonds alone."""
 
 
 def build_walls(mould: Mould, height: float, stiffness: float = STIFFNESS) -> Walls:
@@ -36,7 +44,10 @@ def build_walls(mould: Mould, height: float, stiffness: float = STIFFNESS) -> Wa
     y = np.arange(y0 - RIM, y1 + RIM + 2 * SPACING, SPACING)
     grid = np.stack(np.meshgrid(x, y), axis=-1)
     depth = mould.forbidden_depth(grid.reshape(-1, 2)).reshape(grid.shape[:2])
-    return Walls(depth, float(x[0]), float(y[0]), float(height), float(stiffness))
+    # Depth changes by at most 1 a length: by 1.42 spacings to a square's far corner, and the
+    # spline's knots lie 0.75 spacings from a point in the (weighted) mean.
+    near = depth > -2.25 * SPACING
+    return Walls(depth, near.astype(np.uint8), float(x[0]), float(y[0]), float(height), float(stiffness))
 
 
 @kernel
@@ -68,21 +79,21 @@ def _depth_kernel(x, y, walls):
 
 
 @kernel
-def _far_kernel(x, y, walls):
-    """Whether (x, y) is clearly away from walls: depth changes by at most 1 a length."""
-    rows, columns = walls.depth.shape
+def near_kernel(x, y, z, walls):
+    """Whether a cell at (x, y, z) could touch a wall, the floor or the fill height."""
+    rows, columns = walls.near.shape
     column = int((x - walls.x0) / SPACING)
     row = int((y - walls.y0) / SPACING)
-    inside = 0 <= column < columns and 0 <= row < rows
-    return inside and walls.depth[row, column] < -3 * SPACING
+    inside = 0 <= column < columns and 0 <= row < rows and 0.0 <= z <= walls.height
+    return not inside or walls.near[row, column] != 0
 
 
 @kernel
 def wall_energy(x, y, z, walls):
     """Wall energy of one cell (kappa0 l0^2), and its gradient along x, y and z (kappa0 l0)."""
-    depth, along_x, along_y = -1.0, 0.0, 0.0
-    if not _far_kernel(x, y, walls):
-        depth, along_x, along_y = _depth_kernel(x, y, walls)
+    if not near_kernel(x, y, z, walls):
+        return 0.0, 0.0, 0.0, 0.0
+    depth, along_x, along_y = _depth_kernel(x, y, walls)
     below = max(0.0, -z) - max(0.0, z - walls.height)
     push = walls.stiffness * max(0.0, depth)
     energy = 0.5 * (push * max(0.0, depth) + walls.stiffness * below * below)

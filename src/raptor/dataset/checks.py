@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 
 from raptor.condor.energy import cell_tension, objective
 from raptor.condor.network import build_network
-from raptor.condor.walls import Walls
+from raptor.condor.walls import NO_WALLS
 from raptor.dataset.design import Run, read_design
 from raptor.dataset.examples import mould_images, read_examples, training_scaling
 from raptor.dataset.netcdf import open_file
@@ -30,7 +30,6 @@ from raptor.symmetry import FIELDS
 RELATIVE = 1e-4  # of recomputed values: storage is float32
 DEEP = 5 * SIGMA  # l0; no density lies deeper in a wall
 WALL_YIELD = 0.1  # l0; how far a soft wall gives way
-FREE = Walls(np.full((3, 3), -1e6), 0.0, 0.0, 1e9, 0.0)  # no walls: the energy of bonds alone
 
 
 def check(path: Path) -> list[str]:
@@ -132,7 +131,7 @@ def _check_record(record: Record, shard: Shard, file: str) -> Iterator[str]:
         return
     lattice = record.lattice(shard.model)
     delta = record.parameters.delta
-    energy = objective(record.state, build_network(lattice), FREE, delta)[0]
+    energy = objective(record.state, build_network(lattice), NO_WALLS, delta)[0]
     if abs(energy - record.energy) > RELATIVE * abs(energy) + 1e-9 * lattice.bonds:
         yield f"{where}: energy is {record.energy:.6g}, recomputed {energy:.6g}"
     tension = cell_tension(record.state, lattice, delta, shard.model.tension)

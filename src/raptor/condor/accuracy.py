@@ -1,19 +1,17 @@
 """One simulation, at the accuracy that a user asks for."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from raptor.condor.anneal import anneal
-from raptor.condor.contract import Contraction, contract
+from raptor.condor.contract import Contraction, contract, refine, steps_to
 from raptor.condor.energy import cell_tension, folded_fraction
-from raptor.condor.lattice import Lattice, build_lattice
-from raptor.condor.minimise import Minimum, orientation_lever
-from raptor.condor.network import Network, build_network
-from raptor.condor.walls import Walls, build_walls
+from raptor.condor.minimise import Minimum
+from raptor.condor.system import System, build_system, cast_state
 from raptor.errors import RaptorError
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
@@ -21,47 +19,43 @@ from raptor.parameters import CellParameters, NetworkModel
 
 @dataclass(frozen=True)
 class Accuracy:
-    """A solver and its tolerances: contraction, then optionally a warm anneal, then the last minimum.
+    """A solver and its tolerances.
 
     Parameters
     ----------
     solver : str
         Name written to files.
     contraction : Contraction
-        Steps and tolerances (kappa0 l0, over Delta).
-    warm_sweeps : int
-        Sweeps of an anneal from `WARM_TEMPERATURE` after the contraction; it removes domain walls
-        between orientations without folding.
+        How closely the contraction is followed, and its tolerance.
+    rounds, round_sweeps : int
+        Rounds of agitation and minimisation after the contraction, and the sweeps of each.
     cold_sweeps : int
         Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
+    precision : str
+        "float64" or "float32".
     """
 
     solver: str
     contraction: Contraction
-    warm_sweeps: int = 0
+    rounds: int = 0
+    round_sweeps: int = 0
     cold_sweeps: int = 0
+    precision: str = "float64"
 
-    @property
-    def last(self) -> Contraction:
-        """The final minimisation alone."""
-        return replace(self.contraction, steps=1)
-
-
-WARM_TEMPERATURE = 0.012  # kappa0 l0^2, over Delta^2: energies grow as Delta^2
-WARM_FACTOR = 1e4
 
 ACCURACIES: dict[str, Accuracy] = {
-    # Largest gradient left, over Delta: 0.03, 0.01, 0.001 kappa0 l0.
-    "draft": Accuracy("relax", Contraction(1, 3e-2, 0, 3e-2, 1500)),
-    "standard": Accuracy("contract", Contraction(20, 3e-2, 100, 1e-2, 6000)),
-    "reference": Accuracy("contract", Contraction(20, 1e-2, 200, 1e-3, 20000), warm_sweeps=2000),
+    # Largest gradient left, over Delta: 0.03, 0.02, 0.001 kappa0 l0.
+    "draft": Accuracy("relax", Contraction(1.0, 0, 0.0, 3e-2, 1500)),
+    "standard": Accuracy("contract", Contraction(0.3, 30, 5e-3, 2e-2, 10000)),
+    "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), rounds=5, round_sweeps=300),
 }
 """What `accuracy: draft | standard | reference` means."""
 
 
-def annealed(sweeps: int) -> Accuracy:
-    """The paper's anneal of so many sweeps, as it stands: no minimisation follows."""
-    return Accuracy("anneal", Contraction(1, 0.0, 0, 0.0, 1), cold_sweeps=sweeps)
+def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
+    """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
+    last = Contraction(1.0, 0, 0.0, 1e-3, 30000 if minimised else 1)
+    return Accuracy("anneal", last, cold_sweeps=sweeps)
 
 
 @dataclass(frozen=True)
@@ -132,12 +126,10 @@ def simulate(
         accuracy = ACCURACIES[accuracy]
     started = time.perf_counter()
     rng = np.random.default_rng(seed)
-    lattice = build_lattice(mould, parameters, model)
-    network = build_network(lattice)
-    walls = build_walls(mould, model.height)
-    state = cast_state(lattice, rng)
-    minimum, sweeps = _solve(state, network, walls, parameters.delta, accuracy, rng)
-    state = minimum.state
+    system = build_system(mould, parameters, model, accuracy.precision)
+    lattice = system.lattice
+    minimum, sweeps = _solve(system, parameters.delta, accuracy, rng)
+    state = minimum.state.astype(np.float64)
     if not mould.tethers:
         state = _undrifted(state, lattice.sites, mould)
     return Simulation(
@@ -154,13 +146,6 @@ def simulate(
         sweeps=sweeps,
         wall_time=time.perf_counter() - started,
     )
-
-
-def cast_state(lattice: Lattice, rng: Generator) -> NDArray[np.float64]:
-    """The state (6 * cells,) at casting: cells on their sites, orientations uniform on the sphere."""
-    orientation = rng.normal(size=(3, lattice.cells))
-    orientation /= np.linalg.norm(orientation, axis=0)
-    return np.concatenate([lattice.sites.T.ravel(), orientation.ravel()])
 
 
 def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
@@ -182,32 +167,26 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
 
 
 def _solve(
-    state: NDArray[np.float64],
-    network: Network,
-    walls: Walls,
-    delta: float,
-    accuracy: Accuracy,
-    rng: Generator,
+    system: System, delta: float, accuracy: Accuracy, rng: Generator
 ) -> tuple[Minimum, int]:
     """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
-    if accuracy.cold_sweeps:
-        state = anneal(state, network, walls, delta, rng, sweeps=accuracy.cold_sweeps).state
-    minimum = contract(state, network, walls, delta, accuracy.contraction)
-    if accuracy.warm_sweeps:
-        warm = anneal(
-            minimum.state,
-            network,
-            walls,
-            delta,
-            rng,
-            sweeps=accuracy.warm_sweeps,
-            initial_temperature=WARM_TEMPERATURE * orientation_lever(delta) ** 2,
-            temperature_factor=WARM_FACTOR,
+    state = cast_state(system.lattice, rng).astype(accuracy.precision)
+    sweeps = accuracy.cold_sweeps
+    if sweeps:
+        annealed = anneal(
+            state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps
         )
-        last = contract(warm.state, network, walls, delta, accuracy.last)
-        evaluations = minimum.evaluations + last.evaluations
-        # A warm anneal that ended higher is not kept.
-        if last.energy + last.walled <= minimum.energy + minimum.walled:
-            minimum = last
-        minimum = minimum._replace(evaluations=evaluations)
-    return minimum, accuracy.cold_sweeps + accuracy.warm_sweeps
+        state = annealed.state
+    minimum = contract(state, system, delta, accuracy.contraction, rng)
+    minimum = refine(
+        minimum,
+        system,
+        delta,
+        accuracy.contraction,
+        rng,
+        rounds=accuracy.rounds,
+        sweeps=accuracy.round_sweeps,
+    )
+    sweeps += accuracy.rounds * accuracy.round_sweeps
+    sweeps += len(steps_to(delta, accuracy.contraction.shortening)) * accuracy.contraction.sweeps
+    return minimum, sweeps

@@ -1,20 +1,23 @@
 """The paper's solver: simulated annealing with single-cell trial moves (section "CONDOR model").
 
 One trial move gives one cell a new position and a new orientation and is accepted by Metropolis'
-condition. A sweep tries every cell once, in lattice order; each trial alone obeys detailed
-balance, the fixed order keeps the equilibrium distribution. Adapting the size of proposals to the
-acceptance rate between sweeps (the paper states no sizes) breaks it slightly while sizes change.
+condition. A sweep tries every cell once, a chunk of a sublattice at a time: cells of a chunk share no
+bond, so trying them at once is the same as trying them one after another. Each trial alone obeys
+detailed balance, the fixed order keeps the equilibrium distribution. Adapting the size of
+proposals to the acceptance rate between sweeps (the paper states no sizes) breaks it slightly
+while sizes change.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from raptor.compiled import kernel
-from raptor.condor.energy import SOFTENING, natural_length_kernel, unit_orientations
+from raptor.condor.energy import SOFTENING, unit_orientations
+from raptor.condor.lanes import lanes, load, sqrt, store, where
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls, wall_energy
 from raptor.errors import RaptorError
@@ -23,80 +26,161 @@ INITIAL_TEMPERATURE = 0.0625  # kappa0 l0^2 (paper)
 TEMPERATURE_FACTOR = 1e7  # initial over final temperature (paper)
 TARGET_ACCEPTANCE = 0.4
 LARGEST_STEP = 0.3  # l0; a proposal cannot cross a tether
-LARGEST_TURN = 1.0  # radians, about
+LARGEST_TURN = 2.0  # radians, about
+DRAWS = 7  # random numbers of a trial move
 
 
 class Annealed(NamedTuple):
     """An annealed state (6 * cells,) and the acceptance rate over its last tenth of sweeps."""
 
-    state: NDArray[np.float64]
+    state: NDArray[Any]
     acceptance: float
 
 
-@kernel
-def _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta):
-    """Energy of one cell's bonds and walls, were it at (x, y, z) with orientation (sx, sy, sz)."""
-    cells = state.size // 6
-    energy = wall_energy(x, y, z, walls)[0]
-    for entry in range(network.start[i], network.start[i + 1]):
-        j = network.neighbour[entry]
-        lx, ly, lz = state[j] - x, state[cells + j] - y, state[2 * cells + j] - z
-        length = math.sqrt(lx * lx + ly * ly + lz * lz + SOFTENING)
-        along_first = (lx * sx + ly * sy + lz * sz) / length
-        along_second = (
-            lx * state[3 * cells + j] + ly * state[4 * cells + j] + lz * state[5 * cells + j]
-        ) / length
-        natural = natural_length_kernel(network.neighbour_rest[entry], delta, along_first, along_second)
-        energy += 0.5 * network.neighbour_stiffness[entry] * (length - natural) ** 2
-    return energy
+class _Work(NamedTuple):
+    """Arrays that a sweep works in: random numbers, and the energy and state of a chunk's trials."""
+
+    random: NDArray[Any]
+    trial: NDArray[Any]
 
 
 @kernel
-def _sweep_kernel(state, network, walls, delta, temperature, step, turn, rng):
-    """Try every cell once; returns the number of accepted trial moves."""
-    cells = state.size // 6
+def _uniform_kernel(random, key, count):
+    """Fill an array with numbers in [0, 1): number `count` and following of stream `key`.
+
+    SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014, doi:10.1145/2660193.2660195), which
+    finds any number of a stream without the ones before, and so all lanes at once.
+    """
+    for i in range(random.size):
+        z = key + (count + np.uint64(i)) * np.uint64(0x9E3779B97F4A7C15)
+        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        random[i] = ((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+
+
+@kernel
+def _circle_kernel(part):
+    """Cosine and sine of 2 pi part, for lanes of parts in [-1/2, 1/2].
+
+    From the sine of half the angle, a polynomial fitted to 1e-10: lanes have no sine of their own.
+    """
+    p = part * part
+    half = -0.00702837 * p + 0.08205039
+    half = part * (((half * p - 0.5992522) * p + 2.55016332) * p - 5.16771276) * p + math.pi * part
+    return 1.0 - 2.0 * half * half, 2.0 * half * sqrt(1.0 - half * half)
+
+
+@kernel
+def _propose_kernel(old, random, step, turn):
+    """New positions, uniform in a cube, and orientations, turned alike in all directions."""
+    x, y, z, a, b, c = old
+    width = random.size // DRAWS
+    x = x + step * (2.0 * load(random, 0) - 1.0)
+    y = y + step * (2.0 * load(random, width) - 1.0)
+    z = z + step * (2.0 * load(random, 2 * width) - 1.0)
+    upright = 2.0 * load(random, 3 * width) - 1.0
+    cosine, sine = _circle_kernel(load(random, 4 * width) - 0.5)
+    length = turn * load(random, 5 * width)
+    flat = length * sqrt(1.0 - upright * upright)
+    a, b, c = a + flat * cosine, b + flat * sine, c + length * upright
+    inverse = 1.0 / sqrt(a * a + b * b + c * c)
+    return x, y, z, a * inverse, b * inverse, c * inverse
+
+
+@kernel
+def _stretch_kernel(lx, ly, lz, a, b, c, ua, ub, uc, rest, delta):
+    """|l| - L' of bonds, given displacements and the orientations of both ends."""
+    squared = lx * lx + ly * ly + lz * lz + SOFTENING
+    inverse = 1.0 / sqrt(squared)
+    first = (lx * a + ly * b + lz * c) * inverse
+    second = (lx * ua + ly * ub + lz * uc) * inverse
+    squares = first * first + second * second
+    return squared * inverse - (rest - rest * delta) - 0.5 * rest * delta * squares
+
+
+@kernel
+def _difference_kernel(state, n, room, network, chunk, old, new, delta):
+    """Energy that each trial move of a chunk would add to the bonds of its cell."""
+    x, y, z, a, b, c = old
+    nx, ny, nz, na, nb, nc = new
+    difference = x * 0.0
+    for entry in range(network.entries[chunk], network.entries[chunk + 1]):
+        j = network.second[entry] + room
+        px, py, pz = load(state, j), load(state, j + n), load(state, j + 2 * n)
+        ua, ub, uc = load(state, j + 3 * n), load(state, j + 4 * n), load(state, j + 5 * n)
+        kind = network.kind[entry]
+        stiffness = where(network.bits[entry], network.stiffness[kind], x)
+        rest = network.rest_length[kind]
+        before = _stretch_kernel(px - x, py - y, pz - z, a, b, c, ua, ub, uc, rest, delta)
+        after = _stretch_kernel(px - nx, py - ny, pz - nz, na, nb, nc, ua, ub, uc, rest, delta)
+        difference = difference + stiffness * (after - before) * (after + before)
+    return 0.5 * difference
+
+
+@kernel
+def _accept_kernel(state, n, first, filled, walls, temperature, work):
+    """Metropolis' condition for each trial move of a chunk; returns how many were accepted."""
     accepted = 0
-    for i in range(cells):
-        x, y, z = state[i], state[cells + i], state[2 * cells + i]
-        sx, sy, sz = state[3 * cells + i], state[4 * cells + i], state[5 * cells + i]
-        before = _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta)
-        x += step * (2.0 * rng.random() - 1.0)
-        y += step * (2.0 * rng.random() - 1.0)
-        z += step * (2.0 * rng.random() - 1.0)
-        sx += turn * rng.standard_normal()
-        sy += turn * rng.standard_normal()
-        sz += turn * rng.standard_normal()
-        inverse = 1.0 / math.sqrt(sx * sx + sy * sy + sz * sz)
-        sx, sy, sz = sx * inverse, sy * inverse, sz * inverse
-        after = _cell_energy_kernel(i, x, y, z, sx, sy, sz, state, network, walls, delta)
-        if after <= before or rng.random() < math.exp((before - after) / temperature):
+    trial, drawn = work.trial, (DRAWS - 1) * (work.random.size // DRAWS)
+    for lane in range(filled):
+        i = first + lane
+        added = float(trial[6, lane])
+        added += wall_energy(trial[0, lane], trial[1, lane], trial[2, lane], walls)[0]
+        added -= wall_energy(state[i], state[i + n], state[i + 2 * n], walls)[0]
+        if added <= 0.0 or work.random[drawn + lane] < math.exp(-added / temperature):
             accepted += 1
-            state[i], state[cells + i], state[2 * cells + i] = x, y, z
-            state[3 * cells + i], state[4 * cells + i], state[5 * cells + i] = sx, sy, sz
+            for row in range(6):
+                state[i + row * n] = trial[row, lane]
     return accepted
 
 
 @kernel
-def _anneal_kernel(state, network, walls, delta, initial, factor, sweeps, rng):
+def _sweep_kernel(state, n, network, walls, delta, temperature, step, turn, key, count, work):
+    """Try every cell once; returns the number of accepted trial moves."""
+    room = (state.size - 6 * n) // 2
+    accepted = 0
+    for chunk in range(network.first.size):
+        i = network.first[chunk] + room
+        _uniform_kernel(work.random, key, count + np.uint64(chunk * work.random.size))
+        old = (
+            load(state, i),
+            load(state, i + n),
+            load(state, i + 2 * n),
+            load(state, i + 3 * n),
+            load(state, i + 4 * n),
+            load(state, i + 5 * n),
+        )
+        new = _propose_kernel(old, work.random, step, turn)
+        difference = _difference_kernel(state, n, room, network, chunk, old, new, delta)
+        for row, value in enumerate((*new, difference)):
+            store(work.trial[row], 0, value)
+        accepted += _accept_kernel(state, n, i, network.filled[chunk], walls, temperature, work)
+    return accepted
+
+
+@kernel
+def _anneal_kernel(state, n, network, walls, delta, initial, factor, sweeps, key, work):
     """Cool geometrically over the sweeps; returns the acceptance rate of the last tenth."""
-    cells = state.size // 6
     size = 1.0
     accepted_late = 0
     late = max(1, sweeps // 10)
+    draws = np.uint64(network.first.size * work.random.size)
     for sweep in range(sweeps):
         temperature = initial * factor ** (-sweep / max(1, sweeps - 1))
         accepted = _sweep_kernel(
-            state, network, walls, delta, temperature, LARGEST_STEP * size, LARGEST_TURN * size, rng
-        )
-        size *= math.exp(0.2 * (accepted / cells - TARGET_ACCEPTANCE))
+            state, n, network, walls, delta, temperature, LARGEST_STEP * size, LARGEST_TURN * size,
+            key, np.uint64(sweep) * draws, work,
+        )  # fmt: skip
+        size *= math.exp(0.2 * (accepted / n - TARGET_ACCEPTANCE))
         size = min(1.0, size)
         if sweep >= sweeps - late:
             accepted_late += accepted
-    return accepted_late / (late * cells)
+    return accepted_late / (late * n)
 
 
 def anneal(
-    state: NDArray[np.float64],
+    state: NDArray[Any],
+    order: NDArray[np.int64],
     network: Network,
     walls: Walls,
     delta: float,
@@ -110,6 +194,8 @@ def anneal(
 
     Parameters
     ----------
+    order, network
+        As `build_sublattices` returns them.
     sweeps : int
         Trial moves a cell (1e6 in the paper).
     initial_temperature : float
@@ -128,8 +214,14 @@ def anneal(
             f"{temperature_factor}: at least 1 sweep, a positive temperature and a factor of at "
             "least 1 are needed"
         )
-    state = unit_orientations(state)
+    width = lanes(state.dtype)
+    ordered = np.zeros(state.size + 2 * width, state.dtype)
+    ordered[width:-width] = unit_orientations(state).reshape(6, -1)[:, order].ravel()
+    work = _Work(np.zeros(DRAWS * width, state.dtype), np.zeros((DRAWS, width), state.dtype))
+    key = rng.integers(2**64, dtype=np.uint64)
     acceptance = _anneal_kernel(
-        state, network, walls, delta, initial_temperature, temperature_factor, sweeps, rng
+        ordered, len(order), network, walls, delta, initial_temperature, temperature_factor, sweeps, key, work
     )
-    return Annealed(state, acceptance)
+    annealed = np.empty_like(state)
+    annealed.reshape(6, -1)[:, order] = ordered[width:-width].reshape(6, -1)
+    return Annealed(annealed, acceptance)

@@ -1,18 +1,33 @@
 """Quasi-static contraction, and its one-step draft.
 
-`contract` follows the cast lattice as the gel does: Delta rises to its value in steps, and at each
-step positions and orientations are minimised together. Starting hot, or at the full Delta, can
-fold the network through itself; following the contraction does not.
+`contract` follows the cast lattice as the gel does: Delta rises to its value in steps. At each step
+a few sweeps of Metropolis agitate the cells, so that they leave the shallowest valleys, and then
+positions and orientations are minimised together. A bond across two cells rests at L (1 - Delta);
+the solver chooses the steps so that each shortens it by the same part of its length: large ones
+while the gel is loose, small ones where it is dense and folds easily. A step that folded bonds is
+taken again in two halves, without agitation. Starting hot, or at the full Delta, can fold the network
+through itself; following the contraction does not.
 """
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
+from raptor.condor.anneal import anneal
+from raptor.condor.energy import folded_fraction
 from raptor.condor.minimise import Minimum, minimise
-from raptor.condor.network import Network
-from raptor.condor.walls import Walls
+from raptor.condor.system import System
+
+ENERGY_OF_TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: melts orientations
+ENERGY_OF_FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
+WARMTH_OF_ROUNDS = 2.0  # times the temperature of agitation
+COOLING = 10.0  # from the first to the last temperature of an agitation
+FOLDED = 5e-4  # share of bonds that a step may leave reversed before it is taken again
+HALVINGS = 4
 
 
 @dataclass(frozen=True)
@@ -21,40 +36,134 @@ class Contraction:
 
     Parameters
     ----------
-    steps : int
-        Steps from Delta = 0 to its value; 1 minimises at the full Delta at once (`relax`).
-    step_tolerance, step_limit : float, int
-        Largest gradient (kappa0 l0, over Delta) and evaluations at which a step before the last is left.
-    tolerance, limit : float, int
-        The same for the final minimisation.
+    shortening : float
+        Largest part by which one step shortens a bond's natural length; 1 takes the whole
+        contraction in one step (`relax`).
+    sweeps : int
+        Metropolis sweeps of each step before it is minimised.
+    settled : float
+        A step before the last is left when 25 more evaluations lower the energy by less than
+        this part.
+    tolerance : float
+        Largest component of the gradient at the end, in kappa0 l0 times Delta.
+    limit : int
+        Evaluations of the last minimisation at most.
     """
 
-    steps: int
-    step_tolerance: float
-    step_limit: int
+    shortening: float
+    sweeps: int
+    settled: float
     tolerance: float
     limit: int
 
 
+def agitation_temperature(delta: float) -> float:
+    """Temperature at which orientations melt but bonds do not fold, kappa0 l0^2.
+
+    Energies of turning grow as Delta^2; a bond of natural length l0 (1 - Delta) reverses when thermal
+    motion covers that length.
+    """
+    return min(ENERGY_OF_TURNING * delta**2, ENERGY_OF_FOLDING * (1 - delta) ** 2)
+
+
+def steps_to(delta: float, shortening: float) -> NDArray[np.float64]:
+    """Values of Delta, (steps,), up to delta, each shortening 1 - Delta by at most a given part."""
+    if shortening >= 1 or delta == 0:
+        return np.array([delta])
+    count = math.ceil(math.log(1 - delta) / math.log(1 - shortening) - 1e-9)
+    return np.append(1 - (1 - delta) ** (np.arange(1, count) / count), delta)
+
+
 def contract(
-    state: NDArray[np.float64],
-    network: Network,
-    walls: Walls,
+    state: NDArray[Any], system: System, delta: float, contraction: Contraction, rng: Generator
+) -> Minimum:
+    """Contract a cast state (6 * cells,) to its Delta; evaluations are summed over all steps."""
+    used, reached = 0, 0.0
+    for target in steps_to(delta, contraction.shortening):
+        minimum = _step(state, system, reached, target, contraction, rng, last=target == delta)
+        used += minimum.evaluations
+        state, reached = minimum.state, target
+    return minimum._replace(evaluations=used)
+
+
+def _step(
+    state: NDArray[Any],
+    system: System,
+    start: float,
+    end: float,
+    contraction: Contraction,
+    rng: Generator,
+    last: bool,
+) -> Minimum:
+    """One step from `start` to `end`, in smaller ones where it would fold bonds."""
+    before = folded_fraction(state, system.lattice)
+    used = 0
+    for halving in range(HALVINGS + 1 if contraction.shortening < 1 else 1):
+        trial = state
+        if contraction.sweeps and halving == 0:
+            trial = agitate(trial, system, end, contraction.sweeps, rng)
+        for part in np.linspace(start, end, 2**halving + 1)[1:]:
+            minimum = _minimise(trial, system, part, contraction, last and part == end)
+            used += minimum.evaluations
+            trial = minimum.state
+        if folded_fraction(trial, system.lattice) <= max(before, FOLDED):
+            break
+    return minimum._replace(evaluations=used)
+
+
+def _minimise(
+    state: NDArray[Any], system: System, delta: float, contraction: Contraction, last: bool
+) -> Minimum:
+    return minimise(
+        state,
+        system.network,
+        system.walls,
+        delta,
+        tolerance=contraction.tolerance,
+        settled=0.0 if last else contraction.settled,
+        limit=contraction.limit,
+    )
+
+
+def agitate(
+    state: NDArray[Any], system: System, delta: float, sweeps: int, rng: Generator, warmth: float = 1.0
+) -> NDArray[Any]:
+    """The state after a short anneal from `warmth` times the temperature of agitation."""
+    return anneal(
+        state,
+        system.order,
+        system.sublattices,
+        system.walls,
+        delta,
+        rng,
+        sweeps=sweeps,
+        initial_temperature=max(warmth * agitation_temperature(delta), 1e-9),
+        temperature_factor=COOLING,
+    ).state
+
+
+def refine(
+    minimum: Minimum,
+    system: System,
     delta: float,
     contraction: Contraction,
+    rng: Generator,
+    *,
+    rounds: int,
+    sweeps: int,
 ) -> Minimum:
-    """Contract a state (6 * cells,) to its Delta; evaluations are summed over all steps."""
-    used = 0
-    for step in range(1, contraction.steps):
-        minimum = minimise(
-            state,
-            network,
-            walls,
-            delta * step / contraction.steps,
-            tolerance=contraction.step_tolerance,
-            limit=contraction.step_limit,
-        )
-        state = minimum.state
-        used += minimum.evaluations
-    minimum = minimise(state, network, walls, delta, tolerance=contraction.tolerance, limit=contraction.limit)
-    return minimum._replace(evaluations=used + minimum.evaluations)
+    """Agitate and minimise again and again, keeping what ends lower and does not fold.
+
+    Basin hopping (D. Wales and J. Doye, J. Phys. Chem. A 101, 5111, 1997, doi:10.1021/jp970984n):
+    removes boundaries between domains of orientation.
+    """
+    used = minimum.evaluations
+    for _ in range(rounds):
+        agitated = agitate(minimum.state, system, delta, sweeps, rng, WARMTH_OF_ROUNDS)
+        found = _minimise(agitated, system, delta, contraction, last=True)
+        used += found.evaluations
+        allowed = max(FOLDED, folded_fraction(minimum.state, system.lattice))
+        folds = folded_fraction(found.state, system.lattice) > allowed
+        if found.energy + found.walled < minimum.energy + minimum.walled and not folds:
+            minimum = found
+    return minimum._replace(evaluations=used)

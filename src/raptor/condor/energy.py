@@ -223,14 +223,25 @@ def coordination(lattice: Lattice) -> NDArray[np.int64]:
     return np.bincount(ends, minlength=lattice.cells)
 
 
-def folded_fraction(state: NDArray[np.float64], lattice: Lattice) -> float:
+@kernel
+def _reversed_kernel(positions, sites, first, second):
+    """Number of bonds that point against their direction at casting."""
+    cells = sites.shape[0]
+    count = 0
+    for bond in range(first.size):
+        i, j = first[bond], second[bond]
+        along = 0.0
+        for c in range(3):
+            now = positions[c * cells + j] - positions[c * cells + i]
+            along += now * (sites[j, c] - sites[i, c])
+        count += along < 0.0
+    return count
+
+
+def folded_fraction(state: NDArray[Any], lattice: Lattice) -> float:
     """Share of bonds whose direction has reversed since casting; 0 without bonds."""
-    if lattice.bonds == 0:
-        return 0.0
-    positions = state[: 3 * lattice.cells].reshape(3, -1).T
-    cast = lattice.sites[lattice.second] - lattice.sites[lattice.first]
-    now = positions[lattice.second] - positions[lattice.first]
-    return float(np.mean(np.einsum("bc,bc->b", cast, now) < 0))
+    count = _reversed_kernel(state, lattice.sites, lattice.first, lattice.second)
+    return float(count) / max(1, lattice.bonds)
 
 
 def unit_orientations(state: NDArray[np.float64]) -> NDArray[np.float64]:

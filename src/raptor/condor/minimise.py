@@ -25,6 +25,7 @@ MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
 SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
+WINDOW = 25  # evaluations over which the fall of the energy is judged
 BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the innermost cache
 
 
@@ -192,7 +193,7 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work):
+def _minimise_kernel(state, network, walls, delta, lever, tolerance, settled, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(
         state, work.gradient, network, walls, delta, work.scratch
@@ -201,7 +202,12 @@ def _minimise_kernel(state, network, walls, delta, lever, tolerance, limit, work
     stored = 0
     newest = -1
     memory = work.sg.size
+    looked, energy_then = used, energy + walled
     while used < limit and _largest(work.gradient) > tolerance:
+        if used - looked >= WINDOW:
+            if energy_then - energy - walled < settled * (energy + walled):
+                break
+            looked, energy_then = used, energy + walled
         slope = _direction_kernel(work, stored, newest)
         if slope >= 0.0:
             stored = 0
@@ -248,6 +254,7 @@ def minimise(
     delta: float,
     *,
     tolerance: float,
+    settled: float = 0.0,
     limit: int,
 ) -> Minimum:
     """Minimise the energy of bonds and walls from a state (6 * cells,).
@@ -257,6 +264,9 @@ def minimise(
     tolerance : float
         Largest component of the gradient at which the state has converged, in units of
         kappa0 l0 times `orientation_lever(delta)`.
+    settled : float
+        The state is left, though not converged, when `WINDOW` evaluations lower the energy by
+        less than this part.
     limit : int
         Evaluations of the objective at most.
 
@@ -284,7 +294,7 @@ def minimise(
         scratch=scratch(state.size // 6, state.dtype),
     )
     energy, walled, gradient, used = _minimise_kernel(
-        state, network, walls, delta, lever, tolerance * lever, limit, work
+        state, network, walls, delta, lever, tolerance * lever, settled, limit, work
     )
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
     return Minimum(

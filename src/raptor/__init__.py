@@ -12,5 +12,5 @@ from importlib.metadata import version
 
 __version__ = version("raptor-tissue")
 
-MODEL_VERSION = 1
+MODEL_VERSION = 2
 """Raised whenever a change of code changes results: it travels in rule parameters and in files."""

@@ -3,12 +3,12 @@ import pytest
 import shapely
 
 from raptor.condor import annealed, simulate
-from raptor.condor.accuracy import cast_state
 from raptor.condor.anneal import anneal
 from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.minimise import minimise
-from raptor.condor.network import build_network
+from raptor.condor.network import build_network, build_sublattices
+from raptor.condor.system import cast_state
 from raptor.condor.walls import build_walls
 from raptor.errors import RaptorError
 from raptor.moulds import Circle, Mould
@@ -108,14 +108,14 @@ def test_metropolis_samples_boltzmanns_distribution():
     parameters, model = CellParameters(0.0, 0, 0), NetworkModel(8)
     walls = build_walls(pair, model.height)
     lattice = build_lattice(Mould(shapely.box(-0.4, -0.4, 1.4, 0.4)), parameters, NetworkModel(1))
-    network = build_network(lattice)
+    order, network = build_sublattices(lattice)
     state = cast_state(lattice, np.random.default_rng(0)).reshape(6, -1)
     state[2] += 2.0  # away from floor and fill height
     temperature, rng, lengths = 0.02, np.random.default_rng(1), []
     state = state.ravel()
     for _ in range(4000):
         state = anneal(
-            state, network, walls, 0.0, rng,
+            state, order, network, walls, 0.0, rng,
             sweeps=20, initial_temperature=temperature, temperature_factor=1.0,
         ).state  # fmt: skip
         positions = state.reshape(6, -1)[:3]
@@ -134,6 +134,6 @@ def test_senseless_requests_are_named():
     with pytest.raises(RaptorError, match="accuracy is 'perfect'"):
         simulate(POSTED, MIDDLE, NetworkModel(1), "perfect")
     with pytest.raises(RaptorError, match="at least 1 sweep"):
-        anneal(np.ones(6), None, None, 0.5, np.random.default_rng(0), sweeps=0)
+        anneal(np.ones(6), None, None, None, 0.5, np.random.default_rng(0), sweeps=0)
     with pytest.raises(RaptorError, match="holds no cell"):
         simulate(Mould(shapely.box(0.1, 0.1, 0.3, 0.3), name="tiny"), MIDDLE, NetworkModel(1))

@@ -3,7 +3,7 @@ import pytest
 import shapely
 
 from raptor.condor.lattice import build_lattice, cast_sites, connect, shell_offsets
-from raptor.condor.network import LANES, build_network
+from raptor.condor.network import build_network, build_sublattices
 from raptor.moulds import Circle, Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 from tests import naive
@@ -65,13 +65,47 @@ def test_bonds_can_be_built_again_from_stored_sites(lattice, parameters, model):
     assert np.array_equal(again.second, lattice.second)
 
 
-def test_the_layout_holds_every_bond_once(lattice):
-    network = build_network(lattice)
-    lanes = np.arange(LANES)
-    stiffness = network.stiffness.reshape(-1, LANES)
-    held = stiffness > 0
-    pairs = np.stack([network.chunk_first[:, None] + lanes, network.chunk_second[:, None] + lanes])
-    found = {tuple(pair) for pair in pairs[:, held].T}
-    assert held.sum() == lattice.bonds
-    assert found == set(zip(lattice.first, lattice.second, strict=True))
-    assert len(network.neighbour) == 2 * lattice.bonds
+def bonds_of(network):
+    """Each lane of a layout that holds a bond: first cell, second cell, stiffness, rest, direction."""
+    for chunk in range(len(network.first)):
+        for entry in range(network.entries[chunk], network.entries[chunk + 1]):
+            kind = network.kind[entry]
+            for lane in range(network.filled[chunk]):
+                if network.bits[entry] >> lane & 1:
+                    yield (
+                        network.first[chunk] + lane,
+                        network.second[entry] + lane,
+                        network.stiffness[kind],
+                        network.rest_length[kind],
+                        network.direction[kind],
+                    )
+
+
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+def test_the_layout_holds_every_bond_once(lattice, precision):
+    found = list(bonds_of(build_network(lattice, precision)))
+    wanted = {
+        (i, j): values
+        for i, j, *values in zip(
+            lattice.first, lattice.second, lattice.stiffness, lattice.rest_length, strict=True
+        )
+    }
+    assert len(found) == lattice.bonds
+    assert {(i, j) for i, j, *_ in found} == set(wanted)
+    for i, j, stiffness, rest, direction in found:
+        assert (stiffness, rest) == pytest.approx(wanted[i, j])
+        assert direction == pytest.approx((lattice.sites[j] - lattice.sites[i]) / rest, abs=1e-6)
+
+
+@pytest.mark.parametrize("shells", [(1, 2, 3), (1, 2, 4), (1, 3, 4)])
+def test_sublattices_hold_every_bond_from_both_ends_and_none_within_a_chunk(
+    small_mould, parameters, shells
+):
+    lattice = build_lattice(small_mould, parameters, NetworkModel(3, shells))
+    order, network = build_sublattices(lattice)
+    assert np.array_equal(np.sort(order), np.arange(lattice.cells))
+    found = {(order[i], order[j]) for i, j, *_ in bonds_of(network)}
+    wanted = set(zip(lattice.first, lattice.second, strict=True))
+    assert found == wanted | {(j, i) for i, j in wanted}
+    chunk = np.repeat(np.arange(len(network.first)), network.filled)
+    assert all(chunk[i] != chunk[j] for i, j, *_ in bonds_of(network))

@@ -4,8 +4,9 @@
 a few sweeps of Metropolis agitate the cells, so that they leave the shallowest valleys, and then
 positions and orientations are minimised together. A bond across two cells rests at L (1 - Delta);
 the solver chooses the steps so that each shortens it by the same part of its length: large ones
-while the gel is loose, small ones where it is dense and folds easily. A step that folded bonds is
-taken again in two halves, without agitation. Starting hot, or at the full Delta, can fold the network
+while the gel is loose, small ones where it is dense and folds easily. A step that reversed a
+bond is minimised on with contacts, which push it back; if that fails, the step is taken again with
+contacts and without agitation. Starting hot, or at the full Delta, can fold the network
 through itself; following the contraction does not.
 """
 
@@ -26,8 +27,7 @@ ENERGY_OF_TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: 
 ENERGY_OF_FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
 WARMTH_OF_ROUNDS = 2.0  # times the temperature of agitation
 COOLING = 10.0  # from the first to the last temperature of an agitation
-FOLDED = 5e-4  # share of bonds that a step may leave reversed before it is taken again
-HALVINGS = 4
+CONTACT = 100.0  # kappa0, as the walls
 
 
 @dataclass(frozen=True)
@@ -78,41 +78,57 @@ def contract(
     state: NDArray[Any], system: System, delta: float, contraction: Contraction, rng: Generator
 ) -> Minimum:
     """Contract a cast state (6 * cells,) to its Delta; evaluations are summed over all steps."""
-    used, reached = 0, 0.0
+    used = 0
     for target in steps_to(delta, contraction.shortening):
-        minimum = _step(state, system, reached, target, contraction, rng, last=target == delta)
+        minimum = _step(state, system, target, contraction, rng, last=target == delta)
         used += minimum.evaluations
-        state, reached = minimum.state, target
+        state = minimum.state
     return minimum._replace(evaluations=used)
 
 
 def _step(
     state: NDArray[Any],
     system: System,
-    start: float,
-    end: float,
+    delta: float,
     contraction: Contraction,
     rng: Generator,
     last: bool,
 ) -> Minimum:
-    """One step from `start` to `end`, in smaller ones where it would fold bonds."""
-    before = folded_fraction(state, system.lattice)
-    used = 0
-    for halving in range(HALVINGS + 1 if contraction.shortening < 1 else 1):
-        trial = state
-        if contraction.sweeps and halving == 0:
-            trial = agitate(trial, system, end, contraction.sweeps, rng)
-        for part in np.linspace(start, end, 2**halving + 1)[1:]:
-            minimum = _minimise(trial, system, part, contraction, last and part == end)
-            used += minimum.evaluations
-            trial = minimum.state
-        if folded_fraction(trial, system.lattice) <= max(before, FOLDED):
+    """One step to `delta`: agitated, minimised and, but for the one-step draft, unfolded."""
+    trial = state
+    if contraction.sweeps:
+        trial = agitate(state, system, delta, contraction.sweeps, rng)
+    minimum = _minimise(trial, system, delta, contraction, last)
+    if contraction.shortening < 1:
+        minimum = _unfolded(minimum, state, system, delta, contraction, last)
+    return minimum
+
+
+def _unfolded(
+    minimum: Minimum,
+    start: NDArray[Any],
+    system: System,
+    delta: float,
+    contraction: Contraction,
+    last: bool,
+) -> Minimum:
+    """A minimum without reversed bonds: with contacts from there, or else from the start."""
+    used = minimum.evaluations
+    for state in (minimum.state, start):
+        if folded_fraction(minimum.state, system.lattice) == 0:
             break
+        minimum = _minimise(state, system, delta, contraction, last, CONTACT)
+        used += minimum.evaluations
     return minimum._replace(evaluations=used)
 
 
 def _minimise(
-    state: NDArray[Any], system: System, delta: float, contraction: Contraction, last: bool
+    state: NDArray[Any],
+    system: System,
+    delta: float,
+    contraction: Contraction,
+    last: bool,
+    contact: float = 0.0,
 ) -> Minimum:
     return minimise(
         state,
@@ -121,6 +137,7 @@ def _minimise(
         delta,
         tolerance=contraction.tolerance,
         settled=0.0 if last else contraction.settled,
+        contact=contact,
         limit=contraction.limit,
     )
 
@@ -152,7 +169,7 @@ def refine(
     rounds: int,
     sweeps: int,
 ) -> Minimum:
-    """Agitate and minimise again and again, keeping what ends lower and does not fold.
+    """Agitate and minimise again and again, keeping what ends lower.
 
     Basin hopping (D. Wales and J. Doye, J. Phys. Chem. A 101, 5111, 1997, doi:10.1021/jp970984n):
     removes boundaries between domains of orientation.
@@ -161,9 +178,8 @@ def refine(
     for _ in range(rounds):
         agitated = agitate(minimum.state, system, delta, sweeps, rng, WARMTH_OF_ROUNDS)
         found = _minimise(agitated, system, delta, contraction, last=True)
+        found = _unfolded(found, minimum.state, system, delta, contraction, last=True)
         used += found.evaluations
-        allowed = max(FOLDED, folded_fraction(minimum.state, system.lattice))
-        folds = folded_fraction(found.state, system.lattice) > allowed
-        if found.energy + found.walled < minimum.energy + minimum.walled and not folds:
+        if found.energy + found.walled < minimum.energy + minimum.walled:
             minimum = found
     return minimum._replace(evaluations=used)

@@ -5,6 +5,10 @@ s_i and s_j (paper, equations 1 and 2):
 
     L' = L (1 - Delta/2 (2 - (u.s_i)^2 - (u.s_j)^2)),     E = k/2 (|l| - L')^2.
 
+Matter does not pass through itself, but springs do: where asked for, a **contact** pushes back the
+ends of a bond that are nearer than a hundredth of its rest length along its direction at casting, as
+a wall pushes back a cell.
+
 A state is one array of 6 blocks of `cells` numbers: x, y, z, and the three components of a vector
 along the orientation, whose length does not matter; s and -s are the same cell.
 """
@@ -16,13 +20,14 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from raptor.compiled import kernel
-from raptor.condor.lanes import lanes, load, sqrt, store, total, where
+from raptor.condor.lanes import lanes, load, positive, sqrt, store, total, where
 from raptor.condor.lattice import Lattice
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls, near_kernel, wall_energy
 from raptor.errors import RaptorError
 
 SOFTENING = 1e-12  # l0^2, added to |l|^2: two cells on top of each other keep a finite force
+CONTACT_LENGTH = 0.01  # of a bond's rest length
 
 
 def natural_length(rest_length, delta, squares):
@@ -50,18 +55,18 @@ def scratch(cells: int, precision: DTypeLike = np.float64) -> Scratch:
 
 
 @kernel
-def _bonds_kernel(cells, network, delta, work):
-    """Energy of all bonds of the unit state; adds -dE/dx and dE/ds of both ends to the forces."""
+def _bonds_kernel(cells, network, delta, contact, work):
+    """Energy of all bonds and contacts of the unit state; adds -dE/dx and dE/ds to the forces."""
     unit, force = work.unit, work.force
     room = (unit.size - 6 * cells) // 2
     n = cells
-    energy = 0.0
+    energy = touching = 0.0
     for chunk in range(network.first.size):
         i = network.first[chunk] + room
         x, y, z = load(unit, i), load(unit, i + n), load(unit, i + 2 * n)
         ax, ay, az = load(unit, i + 3 * n), load(unit, i + 4 * n), load(unit, i + 5 * n)
         zero = x * 0.0
-        fx, fy, fz, tx, ty, tz, double = zero, zero, zero, zero, zero, zero, zero
+        fx, fy, fz, tx, ty, tz, double, close = zero, zero, zero, zero, zero, zero, zero, zero
         for entry in range(network.entries[chunk], network.entries[chunk + 1]):
             j = network.second[entry] + room
             kind = network.kind[entry]
@@ -86,6 +91,13 @@ def _bonds_kernel(cells, network, delta, work):
             px = along * ux + by_first * ax + by_second * bx
             py = along * uy + by_first * ay + by_second * by
             pz = along * uz + by_first * az + by_second * bz
+            if contact > 0.0:
+                dx, dy, dz = network.direction[kind]
+                ahead = lx * dx + ly * dy + lz * dz
+                push = positive(CONTACT_LENGTH * network.rest_length[kind] - ahead)
+                push = push * where(network.bits[entry], contact, x)
+                close = close + push * push
+                px, py, pz = px - push * dx, py - push * dy, pz - push * dz
             fx, fy, fz = fx + px, fy + py, fz + pz
             first, second = first * twist, second * twist
             tx, ty, tz = tx + first * ux, ty + first * uy, tz + first * uz
@@ -102,7 +114,9 @@ def _bonds_kernel(cells, network, delta, work):
         store(force, i + 4 * n, load(force, i + 4 * n) + ty)
         store(force, i + 5 * n, load(force, i + 5 * n) + tz)
         energy += total(double)
-    return 0.5 * energy
+        if contact > 0.0:
+            touching += total(close) / contact
+    return 0.5 * energy, 0.5 * touching
 
 
 @kernel
@@ -122,8 +136,8 @@ def _walls_kernel(state, gradient, walls):
 
 
 @kernel
-def _objective_kernel(state, gradient, network, walls, delta, work):
-    """Bond energy and wall energy of a state; fills its gradient."""
+def _objective_kernel(state, gradient, network, walls, delta, contact, work):
+    """Bond energy, and energy of walls and contacts, of a state; fills its gradient."""
     n = state.size // 6
     room = (work.unit.size - 6 * n) // 2
     unit, force = work.unit[room:], work.force[room:]
@@ -134,7 +148,7 @@ def _objective_kernel(state, gradient, network, walls, delta, work):
         a, b, c = state[i], state[i + n], state[i + 2 * n]
         length = math.sqrt(a * a + b * b + c * c)
         unit[i], unit[i + n], unit[i + 2 * n] = a / length, b / length, c / length
-    energy = _bonds_kernel(n, network, delta, work)
+    energy, touching = _bonds_kernel(n, network, delta, contact, work)
     for i in range(3 * n):
         gradient[i] = -force[i]
     for i in range(3 * n, 4 * n):
@@ -146,7 +160,7 @@ def _objective_kernel(state, gradient, network, walls, delta, work):
         gradient[i] = (ga - along * a) / length
         gradient[i + n] = (gb - along * b) / length
         gradient[i + 2 * n] = (gc - along * c) / length
-    return energy, _walls_kernel(state, gradient, walls)
+    return energy, touching + _walls_kernel(state, gradient, walls)
 
 
 @kernel
@@ -172,14 +186,16 @@ def _stretch_kernel(state, first, second, stiffness, rest, delta, hooke, tension
 
 
 def objective(
-    state: NDArray[np.float64], network: Network, walls: Walls, delta: float
-) -> tuple[float, float, NDArray[np.float64]]:
+    state: NDArray[Any], network: Network, walls: Walls, delta: float, contact: float = 0.0
+) -> tuple[float, float, NDArray[Any]]:
     """Energy of the bonds, energy of the walls (kappa0 l0^2) and gradient (6 * cells,) of their sum.
 
     Parameters
     ----------
     state : ndarray (6 * cells,)
         x, y, z (l0) and a vector along each orientation.
+    contact : float
+        Stiffness (kappa0) of contacts, whose energy counts with the walls'; 0 lets bonds reverse.
 
     Raises
     ------
@@ -192,7 +208,7 @@ def objective(
     if (np.linalg.norm(state[3 * cells :].reshape(3, -1), axis=0) == 0).any():
         raise RaptorError("a cell's orientation has length zero; give each a direction")
     gradient = np.empty_like(state)
-    energy, walled = _objective_kernel(state, gradient, network, walls, delta, scratch(cells, state.dtype))
+    energy, walled = _objective_kernel(state, gradient, network, walls, delta, contact, scratch(cells, state.dtype))
     return float(energy), float(walled), gradient
 
 

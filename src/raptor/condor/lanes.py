@@ -50,6 +50,11 @@ def where(bits: int, number: float, like: Any) -> Any:
     return (held * number).astype(like.dtype)
 
 
+def positive(value: Any) -> Any:
+    """Each lane, or zero where it is less."""
+    return np.maximum(value, 0)
+
+
 class _LanesType(types.Type):
     """Numba's type of one register full of a scalar."""
 
@@ -143,6 +148,15 @@ def _where(typing, bits, number, like):
     return like(bits, number, like), generate
 
 
+@intrinsic
+def _positive(typing, value):
+    def generate(context, builder, signature, arguments):
+        zero = ir.Constant(arguments[0].type, [0.0] * value.count)
+        return builder.select(builder.fcmp_ordered(">", arguments[0], zero), arguments[0], zero)
+
+    return value(value), generate
+
+
 @overload(load)
 def _compiled_load(array, i):
     return lambda array, i: _load(array, np.intp(i))
@@ -161,6 +175,11 @@ def _compiled_sqrt(value):
 @overload(total)
 def _compiled_total(value):
     return lambda value: _total(value)
+
+
+@overload(positive)
+def _compiled_positive(value):
+    return lambda value: _positive(value)
 
 
 @overload(where)

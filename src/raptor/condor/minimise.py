@@ -32,7 +32,7 @@ BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the i
 class Minimum(NamedTuple):
     """A minimised state and how it was reached.
 
-    `state` as in `energy`, `energy` of the bonds and `walled` of the walls (kappa0 l0^2),
+    `state` as in `energy`, `energy` of the bonds and `walled` of walls and contacts (kappa0 l0^2),
     `gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
     `evaluations` of the objective, and whether the gradient fell below the tolerance.
     """
@@ -167,7 +167,7 @@ def _direction_kernel(work, stored, newest):
 
 
 @kernel
-def _search_kernel(state, total, slope, length, network, walls, delta, work):
+def _search_kernel(state, total, slope, length, network, walls, delta, contact, work):
     """Shorten a step until the objective falls enough; returns the step and the new energies."""
     used = 0
     energy = walled = 0.0
@@ -180,6 +180,7 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
             network,
             walls,
             delta,
+            contact,
             work.scratch,
         )
         used += 1
@@ -193,10 +194,12 @@ def _search_kernel(state, total, slope, length, network, walls, delta, work):
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, lever, tolerance, settled, limit, work):
+def _minimise_kernel(
+    state, network, walls, delta, contact, lever, tolerance, settled, limit, work
+):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(
-        state, work.gradient, network, walls, delta, work.scratch
+        state, work.gradient, network, walls, delta, contact, work.scratch
     )
     used = 1
     stored = 0
@@ -216,7 +219,7 @@ def _minimise_kernel(state, network, walls, delta, lever, tolerance, settled, li
         if stored == 0:
             length = min(length, 0.1 * _longest_step(work.direction, lever))
         length, new_energy, new_walled, trials = _search_kernel(
-            state, energy + walled, slope, length, network, walls, delta, work
+            state, energy + walled, slope, length, network, walls, delta, contact, work
         )
         used += trials
         if length == 0.0:
@@ -255,6 +258,7 @@ def minimise(
     *,
     tolerance: float,
     settled: float = 0.0,
+    contact: float = 0.0,
     limit: int,
 ) -> Minimum:
     """Minimise the energy of bonds and walls from a state (6 * cells,).
@@ -267,6 +271,8 @@ def minimise(
     settled : float
         The state is left, though not converged, when `WINDOW` evaluations lower the energy by
         less than this part.
+    contact : float
+        Stiffness of contacts (kappa0), as in `objective`.
     limit : int
         Evaluations of the objective at most.
 
@@ -294,7 +300,7 @@ def minimise(
         scratch=scratch(state.size // 6, state.dtype),
     )
     energy, walled, gradient, used = _minimise_kernel(
-        state, network, walls, delta, lever, tolerance * lever, settled, limit, work
+        state, network, walls, delta, contact, lever, tolerance * lever, settled, limit, work
     )
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
     return Minimum(

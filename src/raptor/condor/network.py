@@ -3,7 +3,7 @@
 Cells are ordered by layer, row and column, so neighbours of consecutive cells are mostly
 consecutive cells. A **chunk** is a run of cells that fills one register; an **entry** of a chunk
 is one register full of bonds, from cells `first` + t of the chunk to cells `second` + t, of one
-kind (spring constant and rest length), with a bit for each lane t that does hold a bond. A kernel
+kind (spring constant, rest length and direction at casting), with a bit for each lane t that does hold a bond. A kernel
 keeps a chunk's cells in registers and goes through its entries; nothing is gathered one by one.
 """
 
@@ -21,7 +21,8 @@ class Network(NamedTuple):
 
     Chunk c is cells `first[c]` to `first[c]` + `filled[c]`; its entries are `entries[c]` to
     `entries[c + 1]` of `second` (a cell, less than zero where low lanes hold no bond), `bits`
-    and `kind`; bonds of a kind have `stiffness[kind]` (kappa0) and `rest_length[kind]` (l0).
+    and `kind`; bonds of a kind have `stiffness[kind]` (kappa0), `rest_length[kind]` (l0) and, at
+    casting, `direction[kind]` (unit vectors).
     """
 
     first: NDArray[np.int32]
@@ -32,6 +33,7 @@ class Network(NamedTuple):
     kind: NDArray[np.int16]
     stiffness: NDArray[Any]
     rest_length: NDArray[Any]
+    direction: NDArray[Any]
 
     @property
     def cells(self) -> int:
@@ -89,15 +91,19 @@ def _layout(
     lane = (number - np.maximum.accumulate(np.where(opens_group, number, 0))) % lanes(precision)
     chunk = np.cumsum(lane == 0) - 1
     first = np.flatnonzero(lane == 0)
-    rests, index, kind = np.unique(lattice.rest_length, return_index=True, return_inverse=True)
-    kind = np.tile(kind, 1 + (len(cell) > lattice.bonds))
+    sites = lattice.sites[order]
+    displacement = sites[other] - sites[cell]
+    steps = np.rint(displacement * (2, 2, np.sqrt(2))).astype(np.int64) + 8  # half l0, and layers
+    _, index, kind = np.unique(steps @ (256, 16, 1), return_index=True, return_inverse=True)
+    rest = np.tile(lattice.rest_length, 2)[index]
+    kinds = max(1, len(index))
     # One number for chunk, kind and second cell: much faster to sort than rows of three.
     span, reach = lattice.cells + lanes(precision), lanes(precision)
-    keys = (chunk[cell] * max(1, len(rests)) + kind) * span + (other - lane[cell] + reach)
+    keys = (chunk[cell] * kinds + kind) * span + (other - lane[cell] + reach)
     keys, entry = np.unique(keys, return_inverse=True)
     bits = np.zeros(len(keys), np.uint16)
     np.bitwise_or.at(bits, entry, (1 << lane[cell]).astype(np.uint16))
-    owner, kind = np.divmod(keys // span, max(1, len(rests)))
+    owner, kind = np.divmod(keys // span, kinds)
     return Network(
         first=first.astype(np.int32),
         filled=np.diff(first, append=lattice.cells).astype(np.int32),
@@ -105,6 +111,7 @@ def _layout(
         second=(keys % span - reach).astype(np.int32),
         bits=bits,
         kind=kind.astype(np.int16),
-        stiffness=lattice.stiffness[index].astype(precision),
-        rest_length=rests.astype(precision),
+        stiffness=np.tile(lattice.stiffness, 2)[index].astype(precision),
+        rest_length=rest.astype(precision),
+        direction=(displacement[index] / rest[:, None]).astype(precision),
     )

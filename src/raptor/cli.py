@@ -30,7 +30,7 @@ def simulate(
     kappa_nnnn: KappaNNNN,
     output: Output,
     layers: Annotated[int, typer.Option(help="cell layers between floor and fill height")] = 7,
-    accuracy: Annotated[str, typer.Option(help="draft, standard or reference")] = "standard",
+    accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of the first orientations")] = 0,
 ) -> None:
     """Simulate one mould and write a file of the form of a shard.
@@ -38,7 +38,7 @@ def simulate(
     Example: raptor simulate config/moulds/four_post_rectangle.geojson --delta 0.5
     --kappa-nnn 0.5 --kappa-nnnn 0.3 --output tissue.nc
     """
-    from raptor.condor import ACCURACIES
+    from raptor.condor import accuracy_named
     from raptor.condor import simulate as run_simulation
     from raptor.configuration import content_hash
     from raptor.dataset.design import Run
@@ -48,8 +48,7 @@ def simulate(
 
     parameters = CellParameters(delta, kappa_nnn, kappa_nnnn)
     model = NetworkModel(layers)
-    if accuracy not in ACCURACIES:
-        raise RaptorError(f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}")
+    accuracy_named(accuracy)
     shape = read_mould(mould)
     _require_writable(output)
     tissue = run_simulation(shape, parameters, model, accuracy, seed)

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from raptor import MODEL_VERSION
+from raptor.condor.accuracy import accuracy_named
 from raptor.condor.lattice import cast_sites
 from raptor.dataset.design import DesignRules
 from raptor.errors import RaptorError
@@ -18,12 +19,28 @@ from raptor.morphology import central_section
 from raptor.moulds.geojson import read_mould
 from raptor.moulds.geometry import IMAGE_SIZE, SMALLEST_TETHER
 from raptor.moulds.random_moulds import RandomMoulds
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, NetworkModel, largest_kappa_nnnn
+from raptor.parameters import (
+    DELTA,
+    KAPPA_NNN,
+    KAPPA_NNNN,
+    Bounds,
+    CellParameters,
+    NetworkModel,
+    largest_kappa_nnnn,
+)
 
 AccuracyName = Literal["draft", "standard", "reference"]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
 Positive = Annotated[int, Field(ge=1)]
 Weight = Annotated[float, Field(ge=0)]
+
+
+def _accuracy(name: str) -> str:
+    accuracy_named(name)
+    return name
+
+
+Method = Annotated[str, AfterValidator(_accuracy)]
 
 
 class Block(BaseModel):
@@ -167,14 +184,57 @@ class Fit(Block):
     )
 
 
-class Tradeoff(Block):
-    """The comparison of speed and accuracy on held-out moulds."""
+class TradeoffCase(Block):
+    """A mould and parameters to compare on."""
 
-    simulations: Positive = Field(2, description="test simulations to compare on")
-    accuracies: tuple[AccuracyName, ...] = Field(
-        ("draft", "standard", "reference"), description="accuracy levels to compare"
+    name: Name = Field(description="name of the case")
+    mould: str = Field(description="mould file")
+    delta: float = Field(description="cell-matrix interaction")
+    kappa_nnn: float = Field(description="second spring constant, kappa0")
+    kappa_nnnn: float = Field(description="third spring constant, kappa0")
+    layers: int | None = Field(None, description="layers, where not model.layers")
+    methods: tuple[Method, ...] = Field((), description="further methods, of this case alone")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "TradeoffCase":
+        CellParameters(self.delta, self.kappa_nnn, self.kappa_nnnn)
+        NetworkModel(self.layers or 1)
+        return self
+
+
+SMALL = {"mould": "config/moulds/small_rectangle.geojson"}
+
+
+class Tradeoff(Block):
+    """The comparison of speed and accuracy."""
+
+    methods: tuple[Method, ...] = Field(
+        ("draft", "standard", "anneal-1e3"), description="accuracies to compare"
     )
+    layers: tuple[int, ...] = Field((), description="other numbers of layers to compare")
+    shells: tuple[tuple[int, int, int], ...] = Field((), description="other shells to compare")
+    pixels: tuple[int, ...] = Field((), description="other rasters to compare")
     seeds: int = Field(4, ge=4, description="reference runs that measure the seed-to-seed spread")
+    surrogate: bool = Field(True, description="compare the trained surrogate too")
+    cases: tuple[TradeoffCase, ...] = Field(
+        (
+            TradeoffCase(name="middle", delta=0.5, kappa_nnn=0.5, kappa_nnnn=0.3, **SMALL),
+            TradeoffCase(name="soft", delta=0.9, kappa_nnn=0.1, kappa_nnnn=0.01, **SMALL),
+        ),
+        min_length=1,
+        description="moulds and parameters to compare on",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Tradeoff":
+        names = [case.name for case in self.cases]
+        if len(set(names)) < len(names):
+            raise ValueError("cases: two have the same name; give each its own")
+        for shells in self.shells:
+            NetworkModel(1, shells)
+        for layers in self.layers:
+            NetworkModel(layers)
+        return self
 
 
 class Configuration(Block):
@@ -200,11 +260,12 @@ class Configuration(Block):
                 f"moulds.cells allows {self.moulds.cells[1]} cells, more than {self.model.layers} "
                 f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise model.layers"
             )
-        if self.tradeoff.simulations > self.design.test:
-            raise ValueError(
-                f"tradeoff.simulations is {self.tradeoff.simulations}, but only {self.design.test} "
-                "simulations are held out (design.test)"
-            )
+        for pixels in self.tradeoff.pixels:
+            if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
+                raise ValueError(
+                    f"tradeoff.pixels has {pixels}, no whole part or multiple of fields.pixels "
+                    f"({self.fields.pixels}); choose one that is"
+                )
         return self
 
     @property
@@ -216,6 +277,22 @@ class Configuration(Block):
     def network_model(self) -> NetworkModel:
         """The model of the simulations."""
         return NetworkModel(self.model.layers, self.model.shells, self.model.tension)
+
+    def comparison(self, case: TradeoffCase) -> dict[str, Any]:
+        """All that the comparison on one case hangs on, for the rule that makes it."""
+        model = self.model.model_dump(mode="json")
+        model["layers"] = case.layers or self.model.layers
+        shared = self.tradeoff.model_dump(mode="json", exclude={"cases", "surrogate"})
+        shared["methods"] = list(dict.fromkeys([*shared["methods"], *case.methods]))
+        alike = case.layers in (None, self.model.layers)
+        return {
+            "case": case.model_dump(mode="json", exclude={"methods"}),
+            "model": model,
+            "pixels": self.fields.pixels,
+            "seed": self.seed,
+            "comparison": shared,
+            "surrogate": self.tradeoff.surrogate and alike,
+        }
 
     def random_moulds(self) -> RandomMoulds:
         """What moulds are drawn from."""
@@ -313,6 +390,18 @@ def load_tissues(
             raise RaptorError("; ".join(_explain(error, f"{path}, {name}", Tissue))) from None
         _require_measurable(chosen[name], name, mould_scale)
     return chosen
+
+
+def require_castable(cases: tuple[TradeoffCase, ...]) -> None:
+    """Find out before any work that the moulds of a comparison can be read and cast.
+
+    Raises
+    ------
+    RaptorError
+        Where a mould cannot.
+    """
+    for case in cases:
+        cast_sites(read_mould(Path(case.mould)), 1)
 
 
 def _require_measurable(tissue: Tissue, name: str, scale: float) -> None:

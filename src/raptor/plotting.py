@@ -1,5 +1,6 @@
 """Figures. Each function draws onto a new figure from plain data; `save` writes it."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -204,21 +205,40 @@ def fit_figure(
 
 @STYLED
 def tradeoff_figure(table: pd.DataFrame) -> Figure:
-    """Error of the density field against cost, by method: one small point a mould, a large mean."""
-    figure = new_figure(6.0, 4.0)
-    axes = figure.subplots()
-    colours = dict(zip(table["method"].unique(), ("#8a3355", SIMULATED, "#3c8a5a", PREDICTED), strict=False))
-    for method, group in table.groupby("method", sort=False):
-        colour = colours[method]
-        axes.plot(group["core_seconds"], group["density_error"], ".", color=colour, alpha=0.6)
-        middle = np.exp(np.log(group[["core_seconds", "density_error"]]).mean())
-        axes.plot(middle.iloc[0], middle.iloc[1], "o", color=colour, ms=9)
-        axes.annotate(f"{method}", middle.to_numpy(), xytext=(8, 6), textcoords="offset points", color=colour)
-    axes.axhline(1.0, color=THIRD, ls="--", lw=0.8)
-    axes.set(xscale="log", yscale="log", xlabel="core-seconds a run")
-    axes.margins(x=0.2, y=0.15)
-    axes.set_ylabel("density error / seed-to-seed spread")
+    """Error of density, and energy, against cost: one small point a case, a large mean a method."""
+    table = table.assign(method=table["method"].str.replace(r", seed \d+", "", regex=True))
+    shown = table[~table["method"].str.contains(r"layers|shells|pixels")]
+    figure = new_figure(9.0, 4.2)
+    panels = figure.subplots(1, 2)
+    axes_of = {"density_error": panels[0], "energy_above_best": panels[1]}
+    for quantity, axes in axes_of.items():
+        means = []
+        for method, group in shown.groupby("method", sort=False):
+            points = group[["core_seconds", quantity]].dropna()
+            points = points[points[quantity] > 0]
+            if points.empty:
+                continue
+            colour = _method_colour(str(method))
+            axes.plot(*points.to_numpy().T, ".", color=colour, alpha=0.35, ms=4)
+            means.append((str(method), *np.exp(np.log(points).mean())))
+        for method, x, y in means:
+            axes.plot(x, y, "o", color=_method_colour(method), ms=8)
+            axes.annotate(method, (x, y), xytext=(6, 6), textcoords="offset points", fontsize=7)
+        anneals = sorted((x, y) for method, x, y in means if re.fullmatch(r"anneal-[\de]+", method))
+        if anneals:
+            axes.plot(*np.transpose(anneals), "-", color=_method_colour("anneal"), lw=1, zorder=0)
+        axes.set(xscale="log", yscale="log", xlabel="core-seconds a run")
+        axes.margins(x=0.15, y=0.1)
+    panels[0].axhline(1.0, color=THIRD, ls="--", lw=0.8)
+    panels[0].set_ylabel("density error / seed-to-seed spread")
+    panels[1].set_ylabel("energy above the best unfolded, relative")
     return figure
+
+
+def _method_colour(method: str) -> str:
+    """Colour of a method's family."""
+    families = {"anneal": "#8a3355", "draft": "#b8860b", "standard": SIMULATED, "reference": "#3c8a5a"}
+    return next((colour for name, colour in families.items() if method.startswith(name)), PREDICTED)
 
 
 def save_fields(path: Path, stacks: Mapping[str, NDArray[np.floating]]) -> None:

@@ -1,8 +1,8 @@
-"""Speed against accuracy: what each accuracy level, and the surrogate, costs and gets wrong."""
+"""Speed against accuracy: what each way to a tissue's fields costs and gets wrong."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -11,12 +11,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from raptor.condor.accuracy import Simulation, simulate
-from raptor.dataset.design import Run
 from raptor.fields import rasterise
 from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
-from raptor.parameters import NetworkModel
+from raptor.parameters import CellParameters, NetworkModel
 from raptor.surrogate.inference import Surrogate
 
 
@@ -57,73 +56,158 @@ class Reference:
 class Case:
     """A mould, its parameters, and the setting of a comparison."""
 
-    run: Run
+    name: str
     mould: Mould
+    parameters: CellParameters
     model: NetworkModel
     pixels: int
+    seed: int
 
-    def simulate(self, accuracy: str, seed: int) -> Simulation:
-        """One run at an accuracy."""
-        return simulate(self.mould, self.run.parameters, self.model, accuracy, seed)
+    def simulate(self, accuracy: str, seed: int | None = None) -> Simulation:
+        """One run at an accuracy, of the case's seed or another."""
+        seed = self.seed if seed is None else seed
+        return simulate(self.mould, self.parameters, self.model, accuracy, seed)
 
-    def fields(self, s: Simulation) -> NDArray[np.float64]:
+    def fields(self, s: Simulation, pixels: int | None = None) -> NDArray[np.float64]:
         """Its fields (8, y, x)."""
-        return rasterise(s.positions, s.orientation, s.tension, self.pixels)
+        return rasterise(s.positions, s.orientation, s.tension, pixels or self.pixels)
 
     def shape(self, fields: NDArray[np.floating]) -> NDArray[np.float64]:
-        """A/A0 and w/w0 of fields (8, y, x)."""
-        threshold = density_threshold(self.model.layers, self.pixels)
-        image = mould_image(self.mould, self.pixels)
+        """A/A0 and w/w0 of fields (8, y, x), of any raster."""
+        pixels = fields.shape[-1]
+        threshold = density_threshold(self.model.layers, pixels)
+        image = mould_image(self.mould, pixels)
         return np.array(
             [area_ratio(fields[0], image, threshold), width_ratio(fields[0], self.mould, threshold)]
         )
 
 
-def spread_over_delta(runs: list[Run], count: int) -> list[Run]:
-    """So many held-out runs, from the least Delta to the largest, evenly by rank."""
-    held_out = sorted((r for r in runs if r.split == "test"), key=lambda run: run.parameters.delta)
-    return [held_out[i] for i in np.linspace(0, len(held_out) - 1, count).round().astype(int)]
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared.
+
+    Parameters
+    ----------
+    methods : tuple of str
+        Accuracies, as `raptor.condor.accuracy_named` takes them.
+    layers : tuple of int
+        Other numbers of layers, at `standard`, their fields scaled to the case's number.
+    shells : tuple
+        Other choices of shells, at `standard`.
+    pixels : tuple of int
+        Other rasters of the `standard` run.
+    seeds : int
+        Reference runs that measure the spread.
+    """
+
+    methods: tuple[str, ...]
+    layers: tuple[int, ...] = ()
+    shells: tuple[tuple[int, int, int], ...] = ()
+    pixels: tuple[int, ...] = ()
+    seeds: int = 4
+
+    @property
+    def runs(self) -> int:
+        """Simulations that one case takes."""
+        return self.seeds + len(self.methods) + len(self.layers) + len(self.shells) + bool(self.pixels)
 
 
 def compare(
-    cases: list[Case],
-    accuracies: tuple[str, ...],
-    seeds: int,
-    surrogate: Surrogate,
+    case: Case,
+    comparison: Comparison,
+    surrogate: Surrogate | None = None,
     done: Callable[[str], None] = lambda what: None,
 ) -> pd.DataFrame:
-    """One row a mould and method: cost, energy, and the errors of fields and shapes.
+    """One row a method: cost, energy, and the errors of fields and shapes against reference runs.
 
-    Energies are per cell, kappa0 l0^2, and above the least that any run of the mould reached.
+    `energy_above_best` is the part by which the energy of the bonds lies above the least of any run
+    of the same network without reversed bonds. `core_seconds` are processor time of the run.
     """
+    runs = []
+    for offset in range(1, comparison.seeds + 1):
+        runs.append(_timed(lambda o=offset: case.simulate("reference", case.seed + o)))
+        done(f"reference, seed {offset}")
+    stacks = [case.fields(s) for s, _ in runs]
+    shapes = np.array([case.shape(stack) for stack in stacks])
+    reference = Reference(stacks, shapes.mean(axis=0))
+    rows = [
+        _row(case, reference, f"reference, seed {offset}", stack, seconds) | _outcome(s)
+        for offset, (stack, (s, seconds)) in enumerate(zip(stacks, runs, strict=True), 1)
+    ]
+    for method in comparison.methods:
+        s, seconds = _timed(lambda m=method: case.simulate(m))
+        rows.append(_row(case, reference, method, case.fields(s), seconds) | _outcome(s))
+        done(method)
+    best = min((row["energy"] for row in rows if row["folded_fraction"] == 0), default=np.nan)
+    for row in rows:
+        row["energy_above_best"] = row["energy"] / best - 1 if best else np.nan
+    rows += _other_models(case, reference, comparison, done)
+    rows += _other_rasters(case, reference, comparison.pixels, done)
+    if surrogate is not None:
+        predicted, seconds = _timed(lambda: surrogate.predict_mould(case.mould, case.parameters))
+        rows.append(_row(case, reference, "surrogate", predicted, seconds))
+    spread = {"density_spread": reference.spread[0], "area_spread": shapes[:, 0].std(ddof=1)}
+    spread["width_spread"] = shapes[:, 1].std(ddof=1)
+    return pd.DataFrame(rows).assign(cells=runs[0][0].cells, **spread)
+
+
+def _other_models(
+    case: Case, reference: Reference, comparison: Comparison, done: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """The `standard` run with other layers or shells, its fields scaled to the case's layers."""
+    models = {f"{n} layers": replace(case.model, layers=n) for n in comparison.layers}
+    for shells in comparison.shells:
+        name = "shells " + " ".join(str(shell) for shell in shells)
+        models[name] = replace(case.model, shells=shells)
     rows = []
-    for case in cases:
-        runs = []
-        for offset in range(1, seeds + 1):
-            runs.append(case.simulate("reference", case.run.seed + offset))
-            done(f"{case.run.mould}, reference {offset}")
-        stacks = [case.fields(s) for s in runs]
-        shape = np.mean([case.shape(stack) for stack in stacks], axis=0)
-        reference = Reference(stacks, shape)
-        simulations = []
-        for name in accuracies:
-            started = time.process_time()
-            s = case.simulate(name, case.run.seed)
-            seconds = time.process_time() - started
-            simulations.append(s)
-            rows.append(
-                _row(case, reference, name, case.fields(s), seconds)
-                | {"energy_per_cell": s.energy / s.cells}
-                | {"converged": s.converged, "folded_fraction": s.folded_fraction}
-            )
-            done(f"{case.run.mould}, {name}")
-        best = min(s.energy / s.cells for s in (*runs, *simulations))
-        for row in rows[-len(accuracies) :]:
-            row["energy_above_best"] = row["energy_per_cell"] - best
-        started = time.process_time()
-        predicted = surrogate.predict_mould(case.mould, case.run.parameters)
-        rows.append(_row(case, reference, "surrogate", predicted, time.process_time() - started))
-    return pd.DataFrame(rows)
+    for name, model in models.items():
+        other = replace(case, model=model)
+        s, seconds = _timed(lambda o=other: o.simulate("standard"))
+        fields = case.fields(s) * case.model.layers / model.layers
+        rows.append(_row(case, reference, name, fields, seconds) | _outcome(s))
+        done(name)
+    return rows
+
+
+def _other_rasters(
+    case: Case, reference: Reference, rasters: tuple[int, ...], done: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """The `standard` run on other rasters, spread evenly over the case's pixels."""
+    if not rasters:
+        return []
+    s, simulating = _timed(lambda: case.simulate("standard"))
+    done("rasters")
+    rows = []
+    for pixels in rasters:
+        fields, seconds = _timed(lambda p=pixels: case.fields(s, p))
+        row = _row(case, reference, f"{pixels} pixels", _resampled(fields, case.pixels), seconds)
+        row["area_error"], row["width_error"] = case.shape(fields) - reference.shape
+        rows.append(row | {"core_seconds": simulating + seconds, "raster_seconds": seconds})
+    return rows
+
+
+def _resampled(fields: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
+    """Fields (8, y, x) on another raster; sums over the image stay."""
+    before = fields.shape[-1]
+    if before < pixels:
+        factor = pixels // before
+        return np.kron(fields, np.ones((1, factor, factor))) / factor**2
+    factor = before // pixels
+    return fields.reshape(len(fields), pixels, factor, pixels, factor).sum(axis=(2, 4))
+
+
+def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    started = time.process_time()
+    return work(), time.process_time() - started
+
+
+def _outcome(s: Simulation) -> dict[str, Any]:
+    return {
+        "energy": s.energy,
+        "folded_fraction": s.folded_fraction,
+        "converged": s.converged,
+        "gradient_evaluations": s.gradient_evaluations,
+    }
 
 
 def _row(
@@ -132,11 +216,12 @@ def _row(
     errors = reference.field_error(fields.astype(np.float64))
     area_error, width_error = case.shape(fields) - reference.shape
     return {
-        "simulation": case.run.simulation,
+        "case": case.name,
         "method": method,
         "core_seconds": seconds,
         "density_error": float(errors[0]),
         "tension_error": float(errors[1]),
+        "sxsx_error": float(errors[2]),
         "area_error": float(area_error),
         "width_error": float(width_error),
     }
@@ -145,3 +230,26 @@ def _row(
 def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Root mean square over pixels of the difference of two stacks, a field (8,)."""
     return np.asarray(np.sqrt(((a - b) ** 2).mean(axis=(1, 2))))
+
+
+def summarise(table: pd.DataFrame) -> pd.DataFrame:
+    """One row a method, over its cases: geometric mean of costs, medians and extremes of errors."""
+    named = table.assign(method=table["method"].str.replace(r", seed \d+", "", regex=True))
+    groups = named.groupby("method", sort=False)
+    spreads = {
+        "cases": groups["case"].nunique(),
+        "core_seconds": groups["core_seconds"].agg(lambda x: float(np.exp(np.log(x).mean()))),
+        "microseconds_a_cell": 1e6 * (named["core_seconds"] / named["cells"]).groupby(
+            named["method"], sort=False
+        ).median(),
+        "energy_above_best": groups["energy_above_best"].median(),
+        "density_error": groups["density_error"].median(),
+        "density_error_max": groups["density_error"].max(),
+        "sxsx_error": groups["sxsx_error"].median(),
+        "area_error": groups["area_error"].agg(lambda x: x.abs().mean()),
+        "area_error_max": groups["area_error"].agg(lambda x: x.abs().max()),
+        "width_error": groups["width_error"].agg(lambda x: x.abs().mean()),
+        "width_error_max": groups["width_error"].agg(lambda x: x.abs().max()),
+        "folded_fraction_max": groups["folded_fraction"].max(),
+    }
+    return pd.DataFrame(spreads).reset_index()

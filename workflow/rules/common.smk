@@ -18,11 +18,13 @@ try:
     TISSUES = configuration.load_tissues(
         Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
     )
+    configuration.require_castable(CONFIG.tradeoff.cases)
 except RaptorError as error:
     raise WorkflowError(str(error))
 config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
 
 RESULTS = f"results/{CONFIG.name}"
+CASES = {case.name: case for case in CONFIG.tradeoff.cases}
 MODEL = f"{RESULTS}/surrogate/{CONFIG.surrogate.model}"
 FIGURES = ("design", "fields", "bulk", "training", "tradeoff")
 
@@ -31,6 +33,7 @@ wildcard_constraints:
     shard=r"\d+-\d+",
     tissue="|".join(CONFIG.fit.tissues),
     figure="|".join(FIGURES),
+    case="|".join(CASES),
 
 
 localrules:

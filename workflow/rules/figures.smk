@@ -101,7 +101,7 @@ rule plot_training:
 rule plot_tradeoff:
     """Error against cost, by method."""
     input:
-        table=rules.measure_tradeoff.output.table,
+        table=rules.tabulate_tradeoff.output.table,
     output:
         png=report(
             f"{RESULTS}/figures/tradeoff.png",

@@ -1,37 +1,61 @@
 """Speed against accuracy."""
 
 
+def trained_surrogate(wildcards):
+    """The surrogate's files, where the comparison includes it."""
+    if not CONFIG.comparison(CASES[wildcards.case])["surrogate"]:
+        return []
+    return [rules.train_surrogate.output.weights, rules.train_surrogate.output.model]
+
+
 rule measure_tradeoff:
-    """Cost and errors of each accuracy level, and of the surrogate, on held-out moulds."""
+    """Cost and errors of each method on one mould and one set of parameters."""
     input:
-        design=rules.sample_design.output.design,
-        moulds=rules.sample_design.output.moulds,
-        weights=rules.train_surrogate.output.weights,
-        model=rules.train_surrogate.output.model,
+        mould=lambda wildcards: CASES[wildcards.case].mould,
+        surrogate=trained_surrogate,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
-        table=report(
-            f"{RESULTS}/tradeoff/tradeoff.csv",
-            caption="../report/tradeoff.rst",
-            category="Trade-off",
-        ),
+        table=f"{RESULTS}/tradeoff/cases/{{case}}.csv",
     log:
-        f"{RESULTS}/logs/measure_tradeoff.log",
+        f"{RESULTS}/logs/measure_tradeoff/{{case}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/measure_tradeoff.tsv"
+        f"{RESULTS}/benchmarks/measure_tradeoff/{{case}}.tsv"
     threads: 1
     resources:
         mem_mb=2000,
     params:
-        model=CONFIG.model.model_dump(mode="json"),
-        tradeoff=CONFIG.tradeoff.model_dump(mode="json"),
+        comparison=lambda wildcards: CONFIG.comparison(CASES[wildcards.case]),
         model_version=MODEL_VERSION,
     script:
         "../scripts/measure_tradeoff.py"
 
 
+rule tabulate_tradeoff:
+    """All cases as one table, and what they come to by method."""
+    input:
+        cases=expand(rules.measure_tradeoff.output.table, case=CASES),
+    output:
+        table=f"{RESULTS}/tradeoff/tradeoff.csv",
+        summary=report(
+            f"{RESULTS}/tradeoff/summary.csv",
+            caption="../report/tradeoff.rst",
+            category="Trade-off",
+        ),
+    log:
+        f"{RESULTS}/logs/tabulate_tradeoff.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/tabulate_tradeoff.tsv"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        tradeoff=CONFIG.tradeoff.model_dump(mode="json"),
+    script:
+        "../scripts/tabulate_tradeoff.py"
+
+
 rule tradeoff:
     """The trade of speed against accuracy, measured."""
     input:
-        rules.measure_tradeoff.output,
+        rules.tabulate_tradeoff.output,
         f"{RESULTS}/figures/tradeoff.png",

@@ -17,7 +17,7 @@ from raptor.parameters import CellParameters, NetworkModel
 with logged(snakemake.log[0]):
     started = time.perf_counter()
     mould = Mould(shapely.box(-2, -2, 2, 2), name="kernels")
-    for accuracy in ("draft", "reference"):
+    for accuracy in ("standard", "standard-float32"):
         tissue = simulate(mould, CellParameters(0.1, 0.5, 0.3), NetworkModel(2), accuracy)
     rasterise(tissue.positions, tissue.orientation, tissue.tension, 32)
     content = {"sources": source_hash(), "seconds": round(time.perf_counter() - started, 2)}

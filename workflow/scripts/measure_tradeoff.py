@@ -1,27 +1,37 @@
-"""Compare accuracy levels and the surrogate on held-out moulds."""
+"""Compare methods on one mould and one set of parameters."""
 
 from pathlib import Path
 
-import torch
-
-from raptor.dataset.design import read_design
 from raptor.files import atomic_path
 from raptor.jobs import logged, progress
-from raptor.moulds import read_moulds
-from raptor.parameters import NetworkModel
+from raptor.moulds import read_mould
+from raptor.parameters import CellParameters, NetworkModel
 from raptor.surrogate.inference import load
-from raptor.tradeoff import Case, compare, spread_over_delta
+from raptor.tradeoff import Case, Comparison, compare
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(1)
-    given, chosen = snakemake.params.model, snakemake.params.tradeoff
-    model = NetworkModel(given["layers"], tuple(given["shells"]), given["tension"])
-    surrogate = load(Path(snakemake.input.weights).parent)
-    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
-    runs = spread_over_delta(read_design(Path(snakemake.input.design)), chosen["simulations"])
-    cases = [Case(run, moulds[run.mould], model, surrogate.architecture.pixels) for run in runs]
-    total = len(cases) * (chosen["seeds"] + len(chosen["accuracies"]))
-    with progress("trade-off", total) as done:
-        table = compare(cases, tuple(chosen["accuracies"]), chosen["seeds"], surrogate, done)
+    params = snakemake.params.comparison
+    given, chosen = params["case"], params["comparison"]
+    case = Case(
+        name=given["name"],
+        mould=read_mould(Path(snakemake.input.mould)),
+        parameters=CellParameters(given["delta"], given["kappa_nnn"], given["kappa_nnnn"]),
+        model=NetworkModel(
+            params["model"]["layers"], tuple(params["model"]["shells"]), params["model"]["tension"]
+        ),
+        pixels=params["pixels"],
+        seed=params["seed"] % 2**31,
+    )
+    comparison = Comparison(
+        methods=tuple(chosen["methods"]),
+        layers=tuple(chosen["layers"]),
+        shells=tuple(tuple(shells) for shells in chosen["shells"]),
+        pixels=tuple(chosen["pixels"]),
+        seeds=chosen["seeds"],
+    )
+    trained = snakemake.input.surrogate
+    surrogate = load(Path(trained[0]).parent) if trained else None
+    with progress(case.name, comparison.runs) as done:
+        table = compare(case, comparison, surrogate, done)
     with atomic_path(Path(snakemake.output.table)) as path:
         table.to_csv(path, index=False)

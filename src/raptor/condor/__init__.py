@@ -1,13 +1,13 @@
 """CONDOR: force-dipole cells on a face-centred-cubic spring network in a tethered mould."""
 
-from raptor.condor.accuracy import ACCURACIES, Accuracy, Simulation, annealed, simulate
+from raptor.condor.accuracy import Accuracy, Simulation, accuracy_named, annealed, simulate
 from raptor.condor.lattice import Lattice, build_lattice, cast_sites, connect
 
 __all__ = [
-    "ACCURACIES",
     "Accuracy",
     "Lattice",
     "Simulation",
+    "accuracy_named",
     "annealed",
     "build_lattice",
     "cast_sites",

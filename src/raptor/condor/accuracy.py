@@ -1,7 +1,8 @@
 """One simulation, at the accuracy that a user asks for."""
 
+import re
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -51,11 +52,32 @@ ACCURACIES: dict[str, Accuracy] = {
 }
 """What `accuracy: draft | standard | reference` means."""
 
+ALLOWED = "draft, standard, reference, anneal-SWEEPS and anneal-SWEEPS-minimised, each also with -float32"
+
 
 def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
     """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
     last = Contraction(1.0, 0, 0.0, 1e-3, 30000 if minimised else 1)
     return Accuracy("anneal", last, cold_sweeps=sweeps)
+
+
+def accuracy_named(name: str) -> Accuracy:
+    """The accuracy of a name: a level, or anneal-SWEEPS, each with -float32; see ALLOWED.
+
+    Raises
+    ------
+    RaptorError
+        Where there is no such accuracy.
+    """
+    base, single, _ = name.partition("-float32")
+    anneal_of = re.fullmatch(r"anneal-([1-9]\d*(?:e\d)?)(-minimised)?", base)
+    if anneal_of:
+        accuracy = annealed(int(float(anneal_of[1])), bool(anneal_of[2]))
+    elif base in ACCURACIES:
+        accuracy = ACCURACIES[base]
+    else:
+        raise RaptorError(f"accuracy is '{name}'; allowed are {ALLOWED}")
+    return replace(accuracy, precision="float32") if single else accuracy
 
 
 @dataclass(frozen=True)
@@ -121,9 +143,7 @@ def simulate(
         Where the mould holds no cell or the accuracy has no such name.
     """
     if isinstance(accuracy, str):
-        if accuracy not in ACCURACIES:
-            raise RaptorError(f"accuracy is '{accuracy}'; allowed are {', '.join(ACCURACIES)}")
-        accuracy = ACCURACIES[accuracy]
+        accuracy = accuracy_named(accuracy)
     started = time.perf_counter()
     rng = np.random.default_rng(seed)
     system = build_system(mould, parameters, model, accuracy.precision)

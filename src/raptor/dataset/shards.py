@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor import MODEL_VERSION
-from raptor.condor.accuracy import ACCURACIES, Simulation, simulate
+from raptor.condor.accuracy import Simulation, accuracy_named, simulate
 from raptor.condor.lattice import Lattice, connect
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
@@ -106,7 +106,7 @@ def write_shard(
         file.layers = np.int32(model.layers)
         file.tension = model.tension
         file.accuracy = accuracy
-        file.solver = ACCURACIES[accuracy].solver
+        file.solver = accuracy_named(accuracy).solver
         file.createDimension("simulation", len(runs))
         file.createDimension("cell", sum(s.cells for s in simulations))
         _write_simulations(file, runs, simulations)

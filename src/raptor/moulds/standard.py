@@ -23,6 +23,21 @@ def four_post_rectangle() -> Mould:
     return _posted_rectangle(53.0, 26.5, "four_post_rectangle")
 
 
+def reference_rectangle() -> Mould:
+    """Rectangle, 50 x 25, a post in each corner: what solvers are measured on."""
+    return _posted_rectangle(50.0, 25.0, "reference_rectangle")
+
+
+def small_rectangle() -> Mould:
+    """Rectangle, 26 x 13, a post in each corner: small enough for the paper's whole schedule."""
+    return _posted_rectangle(26.0, 13.0, "small_rectangle", post=1.0, rim=2.5)
+
+
+def free_square() -> Mould:
+    """Square without tethers: a gel that contracts freely."""
+    return Mould(shapely.box(-12, -12, 12, 12), (), "square", "free_square")
+
+
 def i_shape() -> Mould:
     """I-shape with a long tethering bar in each end (paper)."""
     return Mould(_i_outline(), _bars(21.0, 21.0, 1.5), "mirrors", "i_shape")
@@ -67,16 +82,19 @@ def myoblast() -> Mould:
 STANDARD: dict[str, Callable[[], Mould]] = {
     function.__name__: function
     for function in (
-        four_post_rectangle, i_shape, glial_1, glial_2, glial_3,
+        four_post_rectangle, reference_rectangle, small_rectangle, free_square, i_shape, glial_1, glial_2, glial_3,
         fibroblast, corneal, tenocyte, myoblast,
     )
 }  # fmt: skip
 """Every standard mould by name, as it stands in config/moulds/."""
 
 
-def _posted_rectangle(width: float, height: float, name: str) -> Mould:
+def _posted_rectangle(
+    width: float, height: float, name: str, post: float = POST, rim: float = RIM
+) -> Mould:
     outline = shapely.box(-width / 2, -height / 2, width / 2, height / 2)
-    return Mould(outline, _posts(width / 2 - RIM, (RIM - height / 2, height / 2 - RIM)), "mirrors", name)
+    posts = _posts(width / 2 - rim, (rim - height / 2, height / 2 - rim), post)
+    return Mould(outline, posts, "mirrors", name)
 
 
 def _barred_rectangle(width: float, height: float, name: str) -> Mould:
@@ -90,8 +108,8 @@ def _i_outline() -> shapely.Polygon:
     return shapely.Polygon(right + [(-x, -y) for x, y in right])
 
 
-def _posts(x: float, heights: tuple[float, ...]) -> tuple[Tether, ...]:
-    return tuple(Circle(side * x, y, POST) for side, y in product((-1, 1), heights))
+def _posts(x: float, heights: tuple[float, ...], radius: float = POST) -> tuple[Tether, ...]:
+    return tuple(Circle(side * x, y, radius) for side, y in product((-1, 1), heights))
 
 
 def _bars(x: float, length: float, width: float) -> tuple[Tether, ...]:

@@ -25,6 +25,16 @@ def bond_energy(lattice, state, delta):
     return energy
 
 
+def contact_energy(lattice, state, stiffness, part):
+    energy = 0.0
+    positions = state.reshape(6, -1)[:3]
+    for i, j, rest in zip(lattice.first, lattice.second, lattice.rest_length, strict=True):
+        cast = (lattice.sites[j] - lattice.sites[i]) / rest
+        ahead = (positions[:, j] - positions[:, i]) @ cast
+        energy += 0.5 * stiffness * max(0.0, part * rest - ahead) ** 2
+    return energy
+
+
 def cell_tension(lattice, state, delta, kind):
     tensions = [[] for _ in range(lattice.cells)]
     for number in range(lattice.bonds):

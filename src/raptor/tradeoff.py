@@ -239,9 +239,8 @@ def summarise(table: pd.DataFrame) -> pd.DataFrame:
     spreads = {
         "cases": groups["case"].nunique(),
         "core_seconds": groups["core_seconds"].agg(lambda x: float(np.exp(np.log(x).mean()))),
-        "microseconds_a_cell": 1e6 * (named["core_seconds"] / named["cells"]).groupby(
-            named["method"], sort=False
-        ).median(),
+        "microseconds_a_cell": 1e6
+        * (named["core_seconds"] / named["cells"]).groupby(named["method"], sort=False).median(),
         "energy_above_best": groups["energy_above_best"].median(),
         "density_error": groups["density_error"].median(),
         "density_error_max": groups["density_error"].max(),

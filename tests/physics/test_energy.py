@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from raptor.condor.energy import cell_tension, folded_fraction, objective
+from raptor.condor.energy import CONTACT_LENGTH, cell_tension, folded_fraction, objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.network import build_network
-from raptor.condor.walls import STIFFNESS, build_walls
+from raptor.condor.walls import NO_WALLS, STIFFNESS, build_walls
 from raptor.errors import RaptorError
 from raptor.parameters import CellParameters, NetworkModel
 from tests import naive
@@ -20,9 +20,10 @@ def walls(small_mould, lattice):
     return build_walls(small_mould, lattice.height)
 
 
-def test_gradient_is_that_of_the_energy_walls_included(network, walls, random_state):
+@pytest.mark.parametrize("contact", [0.0, 100.0])
+def test_gradient_is_that_of_the_energy_walls_included(network, walls, random_state, contact):
     step = 1e-5
-    _, walled, gradient = objective(random_state, network, walls, 0.6)
+    _, walled, gradient = objective(random_state, network, walls, 0.6, contact)
     assert walled > 0.1  # the state does press on walls
     numeric = np.empty_like(gradient)
     for i in range(len(random_state)):
@@ -30,7 +31,7 @@ def test_gradient_is_that_of_the_energy_walls_included(network, walls, random_st
         for sign in (1, -1):
             moved = random_state.copy()
             moved[i] += sign * step
-            ends.append(sum(objective(moved, network, walls, 0.6)[:2]))
+            ends.append(sum(objective(moved, network, walls, 0.6, contact)[:2]))
         numeric[i] = (ends[0] - ends[1]) / (2 * step)
     assert np.linalg.norm(gradient - numeric) / np.linalg.norm(gradient) < 1e-6
     assert np.abs(gradient - numeric).max() < 1e-6 * np.abs(gradient).max()
@@ -39,6 +40,22 @@ def test_gradient_is_that_of_the_energy_walls_included(network, walls, random_st
 def test_energy_is_that_of_the_slow_twin(lattice, network, walls, random_state):
     energy = objective(random_state, network, walls, 0.6)[0]
     assert energy == pytest.approx(naive.bond_energy(lattice, random_state, 0.6), rel=1e-9)
+
+
+def test_contacts_are_those_of_the_slow_twin(lattice, network, random_state):
+    state = random_state.copy()
+    state[: 3 * lattice.cells] += 0.5 * np.random.default_rng(0).normal(size=3 * lattice.cells)
+    energy = objective(state, network, NO_WALLS, 0.6, 50.0)[1]
+    assert energy > 1  # some bonds are reversed
+    assert energy == pytest.approx(naive.contact_energy(lattice, state, 50.0, CONTACT_LENGTH), rel=1e-9)
+
+
+def test_single_precision_computes_the_same(lattice, network, walls, random_state):
+    single = build_network(lattice, np.float32)
+    double_energy, _, double = objective(random_state, network, walls, 0.6)
+    energy, _, gradient = objective(random_state.astype(np.float32), single, walls, 0.6)
+    assert energy == pytest.approx(double_energy, rel=1e-5)
+    assert np.abs(gradient - double).max() < 1e-4 * np.abs(double).max()
 
 
 def test_walls_are_exact_away_from_corners(small_mould, lattice, network, walls):
@@ -78,8 +95,6 @@ def test_without_contraction_the_cast_lattice_is_at_rest(lattice, network, walls
 
 
 def test_bonds_pull_and_turn_without_net_force_or_torque(lattice, network, random_state):
-    from raptor.condor.walls import NO_WALLS
-
     gradient = objective(random_state, network, NO_WALLS, 0.6)[2].reshape(6, -1)
     blocks = random_state.reshape(6, -1)
     assert gradient[:3].sum(axis=1) == pytest.approx(0, abs=1e-9)

@@ -98,9 +98,7 @@ def test_the_layout_holds_every_bond_once(lattice, precision):
 
 
 @pytest.mark.parametrize("shells", [(1, 2, 3), (1, 2, 4), (1, 3, 4)])
-def test_sublattices_hold_every_bond_from_both_ends_and_none_within_a_chunk(
-    small_mould, parameters, shells
-):
+def test_sublattices_hold_every_bond_from_both_ends_and_none_within_a_chunk(small_mould, parameters, shells):
     lattice = build_lattice(small_mould, parameters, NetworkModel(3, shells))
     order, network = build_sublattices(lattice)
     assert np.array_equal(np.sort(order), np.arange(lattice.cells))

@@ -186,16 +186,12 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
     return blocks.ravel() if free else state
 
 
-def _solve(
-    system: System, delta: float, accuracy: Accuracy, rng: Generator
-) -> tuple[Minimum, int]:
+def _solve(system: System, delta: float, accuracy: Accuracy, rng: Generator) -> tuple[Minimum, int]:
     """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
     state = cast_state(system.lattice, rng).astype(accuracy.precision)
     sweeps = accuracy.cold_sweeps
     if sweeps:
-        annealed = anneal(
-            state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps
-        )
+        annealed = anneal(state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps)
         state = annealed.state
     minimum = contract(state, system, delta, accuracy.contraction, rng)
     minimum = refine(

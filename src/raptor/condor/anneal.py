@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from raptor.compiled import kernel
 from raptor.condor.energy import SOFTENING, unit_orientations
-from raptor.condor.lanes import lanes, load, sqrt, store, where
+from raptor.condor.lanes import lanes, load, positive, sqrt, store, where
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls, wall_energy
 from raptor.errors import RaptorError
@@ -67,7 +67,7 @@ def _circle_kernel(part):
     p = part * part
     half = -0.00702837 * p + 0.08205039
     half = part * (((half * p - 0.5992522) * p + 2.55016332) * p - 5.16771276) * p + math.pi * part
-    return 1.0 - 2.0 * half * half, 2.0 * half * sqrt(1.0 - half * half)
+    return 1.0 - 2.0 * half * half, 2.0 * half * sqrt(positive(1.0 - half * half))
 
 
 @kernel

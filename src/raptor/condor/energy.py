@@ -208,7 +208,9 @@ def objective(
     if (np.linalg.norm(state[3 * cells :].reshape(3, -1), axis=0) == 0).any():
         raise RaptorError("a cell's orientation has length zero; give each a direction")
     gradient = np.empty_like(state)
-    energy, walled = _objective_kernel(state, gradient, network, walls, delta, contact, scratch(cells, state.dtype))
+    energy, walled = _objective_kernel(
+        state, gradient, network, walls, delta, contact, scratch(cells, state.dtype)
+    )
     return float(energy), float(walled), gradient
 
 

@@ -113,9 +113,7 @@ def _sqrt(typing, value):
     def generate(context, builder, signature, arguments):
         vector = arguments[0].type
         name = f"llvm.sqrt.v{value.count}f{value.scalar.bitwidth}"
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(vector, [vector]), name
-        )
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
         return builder.call(function, arguments)
 
     return value(value), generate

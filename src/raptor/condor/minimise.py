@@ -194,13 +194,9 @@ def _search_kernel(state, total, slope, length, network, walls, delta, contact, 
 
 
 @kernel
-def _minimise_kernel(
-    state, network, walls, delta, contact, lever, tolerance, settled, limit, work
-):
+def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, settled, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
-    energy, walled = _objective_kernel(
-        state, work.gradient, network, walls, delta, contact, work.scratch
-    )
+    energy, walled = _objective_kernel(state, work.gradient, network, walls, delta, contact, work.scratch)
     used = 1
     stored = 0
     newest = -1

@@ -89,9 +89,7 @@ STANDARD: dict[str, Callable[[], Mould]] = {
 """Every standard mould by name, as it stands in config/moulds/."""
 
 
-def _posted_rectangle(
-    width: float, height: float, name: str, post: float = POST, rim: float = RIM
-) -> Mould:
+def _posted_rectangle(width: float, height: float, name: str, post: float = POST, rim: float = RIM) -> Mould:
     outline = shapely.box(-width / 2, -height / 2, width / 2, height / 2)
     posts = _posts(width / 2 - rim, (rim - height / 2, height / 2 - rim), post)
     return Mould(outline, posts, "mirrors", name)

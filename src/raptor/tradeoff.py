@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -125,7 +126,7 @@ def compare(
     """
     runs = []
     for offset in range(1, comparison.seeds + 1):
-        runs.append(_timed(lambda o=offset: case.simulate("reference", case.seed + o)))
+        runs.append(_timed(partial(case.simulate, "reference", case.seed + offset)))
         done(f"reference, seed {offset}")
     stacks = [case.fields(s) for s, _ in runs]
     shapes = np.array([case.shape(stack) for stack in stacks])
@@ -135,7 +136,7 @@ def compare(
         for offset, (stack, (s, seconds)) in enumerate(zip(stacks, runs, strict=True), 1)
     ]
     for method in comparison.methods:
-        s, seconds = _timed(lambda m=method: case.simulate(m))
+        s, seconds = _timed(partial(case.simulate, method))
         rows.append(_row(case, reference, method, case.fields(s), seconds) | _outcome(s))
         done(method)
     best = min((row["energy"] for row in rows if row["folded_fraction"] == 0), default=np.nan)
@@ -144,7 +145,7 @@ def compare(
     rows += _other_models(case, reference, comparison, done)
     rows += _other_rasters(case, reference, comparison.pixels, done)
     if surrogate is not None:
-        predicted, seconds = _timed(lambda: surrogate.predict_mould(case.mould, case.parameters))
+        predicted, seconds = _timed(partial(surrogate.predict_mould, case.mould, case.parameters))
         rows.append(_row(case, reference, "surrogate", predicted, seconds))
     spread = {"density_spread": reference.spread[0], "area_spread": shapes[:, 0].std(ddof=1)}
     spread["width_spread"] = shapes[:, 1].std(ddof=1)
@@ -162,7 +163,7 @@ def _other_models(
     rows = []
     for name, model in models.items():
         other = replace(case, model=model)
-        s, seconds = _timed(lambda o=other: o.simulate("standard"))
+        s, seconds = _timed(partial(other.simulate, "standard"))
         fields = case.fields(s) * case.model.layers / model.layers
         rows.append(_row(case, reference, name, fields, seconds) | _outcome(s))
         done(name)
@@ -175,11 +176,11 @@ def _other_rasters(
     """The `standard` run on other rasters, spread evenly over the case's pixels."""
     if not rasters:
         return []
-    s, simulating = _timed(lambda: case.simulate("standard"))
+    s, simulating = _timed(partial(case.simulate, "standard"))
     done("rasters")
     rows = []
     for pixels in rasters:
-        fields, seconds = _timed(lambda p=pixels: case.fields(s, p))
+        fields, seconds = _timed(partial(case.fields, s, pixels))
         row = _row(case, reference, f"{pixels} pixels", _resampled(fields, case.pixels), seconds)
         row["area_error"], row["width_error"] = case.shape(fields) - reference.shape
         rows.append(row | {"core_seconds": simulating + seconds, "raster_seconds": seconds})
@@ -191,9 +192,9 @@ def _resampled(fields: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
     before = fields.shape[-1]
     if before < pixels:
         factor = pixels // before
-        return np.kron(fields, np.ones((1, factor, factor))) / factor**2
+        return np.asarray(np.kron(fields, np.ones((1, factor, factor))) / factor**2)
     factor = before // pixels
-    return fields.reshape(len(fields), pixels, factor, pixels, factor).sum(axis=(2, 4))
+    return np.asarray(fields.reshape(len(fields), pixels, factor, pixels, factor).sum(axis=(2, 4)))
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

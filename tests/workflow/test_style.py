@@ -53,7 +53,7 @@ def test_every_rule_is_complete():
 LAYERS = (
     ("errors", "files", "compiled", "jobs", "parameters", "symmetry"), ("moulds",), ("condor", "morphology"),
     ("fields", "metrics"), ("dataset",), ("surrogate",),
-    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",), ("cli",),
+    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

@@ -1,7 +1,7 @@
 """Print the benchmark: python -m raptor.benchmark [--quick]."""
 
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -10,6 +10,7 @@ from rich.table import Table
 
 from raptor.benchmark.kernels import Rate, bounds, gradient_rates, trial_rates
 from raptor.benchmark.solvers import (
+    Minimised,
     against_scipy,
     compare_preconditioners,
     posted_rectangle,
@@ -17,6 +18,7 @@ from raptor.benchmark.solvers import (
 )
 from raptor.condor import simulate
 from raptor.condor.system import build_system
+from raptor.moulds import Mould
 from raptor.moulds.standard import STANDARD
 from raptor.parameters import CellParameters, NetworkModel
 
@@ -41,28 +43,34 @@ def main(
     for precision in (np.float64, np.float32):
         system = build_system(mould, MIDDLE, model, precision)
         name = np.dtype(precision).name
-        rows = ((b.what, b.machine, f"{b.rate / 1e6:.0f}") for b in bounds(system, precision))
-        _print(f"The machine's bounds on it, {name}", ("what", "measured", "million a second"), rows)
+        limits = [(b.what, b.machine, f"{b.rate / 1e6:.0f}") for b in bounds(system, precision)]
+        _print(f"The machine's bounds on it, {name}", ("what", "measured", "million a second"), limits)
     _print_rates("Trial moves, million a second", trial_rates(mould, MIDDLE, model))
-    minimised = list(against_scipy(mould, MIDDLE, model, 50 if quick else 500))
-    rows = (
-        (m.name, f"{m.energy:.3f}", str(m.evaluations), f"{m.seconds:.2f}", _ratio(minimised, m))
-        for m in minimised
-    )
-    _print("A step of a contraction", ("minimiser", "energy", "evaluations", "s", "time an evaluation"), rows)
+    _print_minimisers(list(against_scipy(mould, MIDDLE, model, 50 if quick else 500)))
     at = (25, 50) if quick else (25, 50, 100, 200, 400)
     for name, parameters in (("middle", MIDDLE), ("soft", SOFT)):
         found = compare_preconditioners(mould, parameters, model, at)
-        rows = ((p.name, *(f"{e:.2f}" for e in p.energies), f"{p.milliseconds:.2f}") for p in found)
+        compared = [(p.name, *(f"{e:.2f}" for e in p.energies), f"{p.milliseconds:.2f}") for p in found]
         heads = ("preconditioner", *(f"E after {n}" for n in at), "ms a step")
-        _print(f"L-BFGS with preconditioners, a step of the {name} case", heads, rows)
+        _print(f"L-BFGS with preconditioners, a step of the {name} case", heads, compared)
     _print_levels(mould, model, 2 if quick else SEEDS)
     _print_scaling((300, 600) if quick else (1000, 3000, 10000, 30000, 100000), 1 if quick else 3)
 
 
-def _ratio(minimised: list[Any], one: Any) -> str:
+def _print_minimisers(minimised: list[Minimised]) -> None:
     base = minimised[0].seconds / minimised[0].evaluations
-    return f"{one.seconds / one.evaluations / base:.1f} x"
+    rows = [
+        (
+            m.name,
+            f"{m.energy:.3f}",
+            str(m.evaluations),
+            f"{m.seconds:.2f}",
+            f"{m.seconds / m.evaluations / base:.1f} x",
+        )
+        for m in minimised
+    ]
+    heads = ("minimiser", "energy", "evaluations", "s", "time an evaluation")
+    _print("A step of a contraction", heads, rows)
 
 
 def _print_rates(title: str, rates: Iterable[Rate]) -> None:
@@ -72,7 +80,7 @@ def _print_rates(title: str, rates: Iterable[Rate]) -> None:
     _print(title, ("what", "million a second", "against the first"), rows)
 
 
-def _print_levels(mould: Any, model: NetworkModel, seeds: int) -> None:
+def _print_levels(mould: Mould, model: NetworkModel, seeds: int) -> None:
     rows = []
     for name, parameters in (("middle", MIDDLE), ("soft", SOFT)):
         for accuracy in ("standard", "standard-float32"):

@@ -58,15 +58,15 @@ def positive(value: Any) -> Any:
 class _LanesType(types.Type):
     """Numba's type of one register full of a scalar."""
 
-    def __init__(self, scalar):
+    def __init__(self, scalar) -> None:
         self.scalar = scalar
         self.count = REGISTER * 8 // scalar.bitwidth
         super().__init__(name=f"Lanes({scalar})")
 
 
 @register_model(_LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]  # Numba is untyped
-    def __init__(self, manager, kind):
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager, kind) -> None:
         vector = ir.VectorType(manager[kind.scalar].get_value_type(), kind.count)
         super().__init__(manager, kind, vector)
 

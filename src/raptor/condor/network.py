@@ -3,8 +3,9 @@
 Cells are ordered by layer, row and column, so neighbours of consecutive cells are mostly
 consecutive cells. A **chunk** is a run of cells that fills one register; an **entry** of a chunk
 is one register full of bonds, from cells `first` + t of the chunk to cells `second` + t, of one
-kind (spring constant, rest length and direction at casting), with a bit for each lane t that does hold a bond. A kernel
-keeps a chunk's cells in registers and goes through its entries; nothing is gathered one by one.
+kind (spring constant, rest length and direction at casting), with a bit for each lane t that does
+hold a bond. A kernel keeps a chunk's cells in registers and goes through its entries; nothing is
+gathered one by one.
 """
 
 from typing import Any, NamedTuple

@@ -82,8 +82,8 @@ def myoblast() -> Mould:
 STANDARD: dict[str, Callable[[], Mould]] = {
     function.__name__: function
     for function in (
-        four_post_rectangle, reference_rectangle, small_rectangle, free_square, i_shape, glial_1, glial_2, glial_3,
-        fibroblast, corneal, tenocyte, myoblast,
+        four_post_rectangle, reference_rectangle, small_rectangle, free_square, i_shape,
+        glial_1, glial_2, glial_3, fibroblast, corneal, tenocyte, myoblast,
     )
 }  # fmt: skip
 """Every standard mould by name, as it stands in config/moulds/."""

@@ -1,0 +1,60 @@
+"""The benchmark runs, and its baselines compute the same physics."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from raptor.benchmark.baselines import (
+    gradient_by_bonds,
+    gradient_by_neighbours,
+    neighbour_table,
+    torch_gradient,
+)
+from raptor.benchmark.solvers import elastic_stiffness
+from raptor.condor.energy import objective, unit_orientations
+from raptor.condor.network import build_network
+from raptor.condor.system import build_system
+from raptor.condor.walls import NO_WALLS
+
+
+def test_baselines_have_the_energy_and_gradient_of_the_kernel(lattice, random_state):
+    state = unit_orientations(random_state)
+    energy, _, wanted = objective(state, build_network(lattice), NO_WALLS, 0.6)
+    found = {name: np.empty_like(state) for name in ("neighbours", "bonds")}
+    bonds = (lattice.first, lattice.second, lattice.stiffness, lattice.rest_length)
+    energies = [
+        gradient_by_neighbours(state, found["neighbours"], neighbour_table(lattice), 0.6),
+        gradient_by_bonds(state, found["bonds"], *bonds, 0.6),
+    ]
+    last, found["torch"] = torch_gradient(lattice, 0.6)(state)
+    assert [*energies, last] == pytest.approx([energy] * 3, rel=1e-10)
+    orientations = state.reshape(6, -1)[3:]
+    for gradient in found.values():
+        blocks = gradient.reshape(6, -1)
+        blocks[3:] -= (blocks[3:] * orientations).sum(axis=0) * orientations
+        assert np.abs(blocks.ravel() - wanted).max() < 1e-9 * np.abs(wanted).max()
+
+
+def test_elastic_stiffness_is_the_curvature_without_contraction(small_mould, parameters, model):
+    """At rest and Delta = 0 the Hessian of the energy is the sum of k u u^T."""
+    system = build_system(small_mould, parameters, model)
+    n = system.lattice.cells
+    rest = np.concatenate([system.lattice.sites.T.ravel(), np.ones(3 * n)])
+    push = np.zeros(6 * n)
+    push[: 3 * n] = np.random.default_rng(0).normal(size=3 * n)
+    step = 1e-5
+    ends = [objective(rest + sign * step * push, system.network, NO_WALLS, 0.0)[2] for sign in (1, -1)]
+    curvature = (ends[0] - ends[1])[: 3 * n] / (2 * step)
+    assert elastic_stiffness(system, rest) @ push[: 3 * n] == pytest.approx(
+        curvature, abs=2e-3 * np.abs(curvature).max()
+    )
+
+
+def test_the_benchmark_prints_its_tables():
+    command = [sys.executable, "-m", "raptor.benchmark", "--quick"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    for title in ("Gradient", "bounds", "Trial moves", "preconditioners", "Whole runs", "to the power"):
+        assert title in done.stdout

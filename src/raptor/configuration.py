@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -216,6 +216,8 @@ class Tradeoff(Block):
     pixels: tuple[int, ...] = Field((), description="other rasters to compare")
     seeds: int = Field(4, ge=4, description="reference runs that measure the seed-to-seed spread")
     surrogate: bool = Field(True, description="compare the trained surrogate too")
+    folding_case: Name = Field("soft", description="case whose folded and unfolded state are drawn")
+    folding_method: Method = Field("anneal-1e4", description="method that folds it")
     cases: tuple[TradeoffCase, ...] = Field(
         (
             TradeoffCase(name="middle", delta=0.5, kappa_nnn=0.5, kappa_nnnn=0.3, **SMALL),
@@ -230,6 +232,9 @@ class Tradeoff(Block):
         names = [case.name for case in self.cases]
         if len(set(names)) < len(names):
             raise ValueError("cases: two have the same name; give each its own")
+        if self.folding_case not in names:
+            known = ", ".join(names)
+            raise ValueError(f"folding_case is '{self.folding_case}'; cases are {known}")
         for shells in self.shells:
             NetworkModel(1, shells)
         for layers in self.layers:
@@ -282,7 +287,9 @@ class Configuration(Block):
         """All that the comparison on one case hangs on, for the rule that makes it."""
         model = self.model.model_dump(mode="json")
         model["layers"] = case.layers or self.model.layers
-        shared = self.tradeoff.model_dump(mode="json", exclude={"cases", "surrogate"})
+        shared = self.tradeoff.model_dump(
+            mode="json", include={"methods", "layers", "shells", "pixels", "seeds"}
+        )
         shared["methods"] = list(dict.fromkeys([*shared["methods"], *case.methods]))
         alike = case.layers in (None, self.model.layers)
         return {
@@ -444,7 +451,10 @@ def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> Iter
 def _keys_beside(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """Names of the keys that may stand where an unknown one was found."""
     for part in place[:-1]:
-        block = model.model_fields[str(part)].annotation
+        if isinstance(part, int):  # an item of a list: its model is known already
+            continue
+        block = model.model_fields[part].annotation
+        block = next((inner for inner in get_args(block) if isinstance(inner, type)), block)
         if not (isinstance(block, type) and issubclass(block, BaseModel)):
             return []
         model = block

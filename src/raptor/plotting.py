@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from raptor.condor import Simulation
 from raptor.files import atomic_path
 from raptor.metrics import BULK
 from raptor.moulds.geometry import IMAGE_SIZE, Mould
@@ -232,6 +233,28 @@ def tradeoff_figure(table: pd.DataFrame) -> Figure:
     panels[0].axhline(1.0, color=THIRD, ls="--", lw=0.8)
     panels[0].set_ylabel("density error / seed-to-seed spread")
     panels[1].set_ylabel("energy above the best unfolded, relative")
+    return figure
+
+
+@STYLED
+def folding_figure(
+    tissues: Mapping[str, Simulation], shares: Mapping[str, NDArray[np.float64]], mould: Mould
+) -> Figure:
+    """Tissues from above, cells coloured by the share (cells,) of their bonds that are reversed."""
+    figure = new_figure(9.0, 3.2)
+    panels = figure.subplots(1, len(tissues), sharex=True, sharey=True)
+    for axes, (name, s) in zip(panels, tissues.items(), strict=True):
+        order = np.argsort(shares[name], kind="stable")
+        x, y = s.positions[order, :2].T
+        points = axes.scatter(
+            x, y, c=shares[name][order], s=6, cmap="viridis", vmin=0, vmax=0.5, linewidths=0, rasterized=True
+        )
+        draw_mould(axes, mould, fill=False)
+        axes.set_aspect("equal")
+        axes.set_title(f"{name}: $E$ = {s.energy:.2f}, reversed {100 * s.folded_fraction:.1f} %", fontsize=9)
+        axes.set_xlabel("$x$ / $l_0$")
+    panels[0].set_ylabel("$y$ / $l_0$")
+    figure.colorbar(points, ax=panels, label="share of a cell's bonds reversed", shrink=0.8)
     return figure
 
 

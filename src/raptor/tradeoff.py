@@ -64,6 +64,19 @@ class Case:
     pixels: int
     seed: int
 
+    @classmethod
+    def of(cls, content: dict[str, Any], mould: Mould) -> "Case":
+        """The case that a configuration's `comparison` states."""
+        given, model = content["case"], content["model"]
+        return cls(
+            given["name"],
+            mould,
+            CellParameters(given["delta"], given["kappa_nnn"], given["kappa_nnnn"]),
+            NetworkModel(model["layers"], tuple(model["shells"]), model["tension"]),
+            content["pixels"],
+            content["seed"] % 2**31,
+        )
+
     def simulate(self, accuracy: str, seed: int | None = None) -> Simulation:
         """One run at an accuracy, of the case's seed or another."""
         seed = self.seed if seed is None else seed

@@ -1,10 +1,11 @@
 import numpy as np
+import pandas as pd
 import pytest
 
 from raptor.evaluation import without_sign
 from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse
 from raptor.symmetry import FIELDS
-from raptor.tradeoff import Reference
+from raptor.tradeoff import Reference, _resampled, summarise
 
 RNG = np.random.default_rng(0)
 
@@ -53,3 +54,30 @@ def test_the_best_prediction_scores_one_and_another_run_root_two():
     assert reference.spread == pytest.approx(0.3, rel=0.02)
     assert reference.field_error(truth) == pytest.approx(1, rel=0.02)
     assert reference.field_error(runs[5]) == pytest.approx(np.sqrt(2), rel=0.02)
+
+
+def test_other_rasters_keep_the_sums():
+    fields = RNG.uniform(size=(8, 16, 16))
+    for pixels in (8, 16, 64):
+        other = _resampled(fields, pixels)
+        assert other.shape == (8, pixels, pixels)
+        assert other.sum(axis=(1, 2)) == pytest.approx(fields.sum(axis=(1, 2)))
+
+
+def test_a_summary_has_a_row_a_method():
+    table = pd.DataFrame(
+        {
+            "case": ["a", "a", "b", "a"],
+            "method": ["reference, seed 1", "reference, seed 2", "reference, seed 1", "standard"],
+            "core_seconds": [1.0, 4.0, 2.0, 0.5],
+            "cells": [100] * 4,
+            "folded_fraction": 0.0,
+            "energy_above_best": [0.0, 0.1, 0.0, 0.2],
+        }
+        | {f"{name}_error": [1.0, -2.0, 3.0, 1.5] for name in ("density", "sxsx", "area", "width")}
+    )
+    summary = summarise(table).set_index("method")
+    assert summary.index.tolist() == ["reference", "standard"]
+    assert summary.loc["reference", "cases"] == 2
+    assert summary.loc["reference", "core_seconds"] == pytest.approx(2.0)  # the geometric mean
+    assert summary.loc["reference", "area_error"] == pytest.approx(2.0)  # of magnitudes

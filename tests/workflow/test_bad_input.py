@@ -5,6 +5,11 @@ import yaml
 
 from tests.workflow.test_end_to_end import variant
 
+CASE = {
+    "name": "one", "mould": "config/moulds/small_rectangle.geojson",
+    "delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3,
+}  # fmt: skip
+
 
 @pytest.mark.parametrize(
     ("change", "message"),
@@ -19,7 +24,11 @@ from tests.workflow.test_end_to_end import variant
         ({"design__kappa_nnnn": [0.6, 0.7]}, "within [0.01, 0.5]"),
         ({"fields__pixels": 100}, "fields.pixels"),
         ({"moulds__cells": [100, 400000]}, "more than 2 layers hold"),
-        ({"tradeoff__simulations": 3}, "only 2 simulations are held out"),
+        ({"tradeoff__methods": ["perfect"]}, "accuracy is 'perfect'; allowed are draft"),
+        ({"tradeoff__pixels": [24]}, "no whole part or multiple of fields.pixels"),
+        ({"tradeoff__folding_case": "two"}, "folding_case is 'two'; cases are one"),
+        ({"tradeoff__cases": [CASE | {"dleta": 0.5}]}, "'tradeoff.cases.0.dleta'; did you mean 'delta'?"),
+        ({"tradeoff__cases": [CASE | {"mould": "none.geojson"}]}, "none.geojson"),
         ({"fit__tissues": ["glial"]}, "has no tissue 'glial'; did you mean 'glial_"),
         ({"fit__tissues_file": "none.yaml"}, "none.yaml cannot be read"),
     ],

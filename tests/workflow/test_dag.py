@@ -9,7 +9,7 @@ EVERYTHING = {
     "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
     "augment_dataset", "check_dataset", "write_card", "train_surrogate", "evaluate_surrogate",
     "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
-    "plot_training", "plot_fit", "plot_tradeoff", "report",
+    "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",
 }  # fmt: skip
 
 

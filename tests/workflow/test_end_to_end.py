@@ -89,12 +89,17 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
-    assert tradeoff["method"].tolist() == ["draft", "standard", "surrogate"]
+    others = ["draft", "anneal-20", "1 layers", "shells 1 2 4", "16 pixels", "surrogate"]
+    assert tradeoff["method"].tolist() == [f"reference, seed {n}" for n in range(1, 5)] + others
     assert (tradeoff["core_seconds"] > 0).all()
+    assert tradeoff["density_error"].notna().all()
+    summary = pd.read_csv(results / "tradeoff" / "summary.csv").set_index("method")
+    assert summary.index.tolist() == ["reference", *others]
+    assert summary.loc["anneal-20", "energy_above_best"] > summary.loc["reference", "energy_above_best"]
 
 
 def test_every_figure_has_its_data(results):
-    for figure in ("design", "fields", "bulk", "training", "tradeoff", "fit_glial_1"):
+    for figure in ("design", "fields", "bulk", "training", "tradeoff", "folding", "fit_glial_1"):
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made
         assert made & {".csv", ".nc"}

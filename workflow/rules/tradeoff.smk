@@ -1,18 +1,15 @@
 """Speed against accuracy."""
 
 
-def trained_surrogate(wildcards):
-    """The surrogate's files, where the comparison includes it."""
-    if not CONFIG.comparison(CASES[wildcards.case])["surrogate"]:
-        return []
-    return [rules.train_surrogate.output.weights, rules.train_surrogate.output.model]
-
-
 rule measure_tradeoff:
     """Cost and errors of each method on one mould and one set of parameters."""
     input:
         mould=lambda wildcards: CASES[wildcards.case].mould,
-        surrogate=trained_surrogate,
+        surrogate=lambda wildcards: (
+            [rules.train_surrogate.output.weights, rules.train_surrogate.output.model]
+            if CONFIG.comparison(CASES[wildcards.case])["surrogate"]
+            else []
+        ),
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         table=f"{RESULTS}/tradeoff/cases/{{case}}.csv",
@@ -54,8 +51,37 @@ rule tabulate_tradeoff:
         "../scripts/tabulate_tradeoff.py"
 
 
+rule plot_folding:
+    """One tissue as it contracts, and folded by an anneal."""
+    input:
+        mould=CASES[CONFIG.tradeoff.folding_case].mould,
+        kernels=ancient(rules.compile_kernels.output.kernels),
+    output:
+        png=report(
+            f"{RESULTS}/figures/folding.png",
+            caption="../report/plot_folding.rst",
+            category="Trade-off",
+        ),
+        svg=f"{RESULTS}/figures/folding.svg",
+        data=f"{RESULTS}/figures/folding.csv",
+    log:
+        f"{RESULTS}/logs/plot_folding.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_folding.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        comparison=CONFIG.comparison(CASES[CONFIG.tradeoff.folding_case]),
+        method=CONFIG.tradeoff.folding_method,
+        model_version=MODEL_VERSION,
+    script:
+        "../scripts/plot_folding.py"
+
+
 rule tradeoff:
     """The trade of speed against accuracy, measured."""
     input:
         rules.tabulate_tradeoff.output,
+        rules.plot_folding.output.png,
         f"{RESULTS}/figures/tradeoff.png",

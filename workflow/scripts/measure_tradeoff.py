@@ -5,23 +5,13 @@ from pathlib import Path
 from raptor.files import atomic_path
 from raptor.jobs import logged, progress
 from raptor.moulds import read_mould
-from raptor.parameters import CellParameters, NetworkModel
 from raptor.surrogate.inference import load
 from raptor.tradeoff import Case, Comparison, compare
 
 with logged(snakemake.log[0]):
     params = snakemake.params.comparison
-    given, chosen = params["case"], params["comparison"]
-    case = Case(
-        name=given["name"],
-        mould=read_mould(Path(snakemake.input.mould)),
-        parameters=CellParameters(given["delta"], given["kappa_nnn"], given["kappa_nnnn"]),
-        model=NetworkModel(
-            params["model"]["layers"], tuple(params["model"]["shells"]), params["model"]["tension"]
-        ),
-        pixels=params["pixels"],
-        seed=params["seed"] % 2**31,
-    )
+    chosen = params["comparison"]
+    case = Case.of(params, read_mould(Path(snakemake.input.mould)))
     comparison = Comparison(
         methods=tuple(chosen["methods"]),
         layers=tuple(chosen["layers"]),

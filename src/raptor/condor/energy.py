@@ -262,6 +262,18 @@ def folded_fraction(state: NDArray[Any], lattice: Lattice) -> float:
     return float(count) / max(1, lattice.bonds)
 
 
+def reversed_share(positions: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
+    """Share of each cell's bonds that point against their direction at casting, (cells,).
+
+    `positions` are (cells, 3), l0.
+    """
+    now = positions[lattice.second] - positions[lattice.first]
+    cast = lattice.sites[lattice.second] - lattice.sites[lattice.first]
+    turned = np.einsum("bc,bc->b", now, cast) < 0
+    ends = np.concatenate([lattice.first[turned], lattice.second[turned]])
+    return np.bincount(ends, minlength=lattice.cells) / np.maximum(coordination(lattice), 1)
+
+
 def unit_orientations(state: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same state with orientations of length one."""
     unit = state.copy()

@@ -1,0 +1,31 @@
+"""Draw a tissue unfolded and folded."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.condor import build_lattice
+from raptor.condor.energy import reversed_share
+from raptor.files import atomic_path
+from raptor.jobs import logged, progress
+from raptor.moulds import read_mould
+from raptor.plotting import folding_figure, save
+from raptor.tradeoff import Case
+
+with logged(snakemake.log[0]):
+    case = Case.of(snakemake.params.comparison, read_mould(Path(snakemake.input.mould)))
+    lattice = build_lattice(case.mould, case.parameters, case.model)
+    methods = ("reference", snakemake.params.method)
+    with progress("folding", len(methods)) as done:
+        tissues = {}
+        for method in methods:
+            tissues[method] = case.simulate(method)
+            done(method)
+    shares = {name: reversed_share(s.positions, lattice) for name, s in tissues.items()}
+    save(folding_figure(tissues, shares, case.mould), Path(snakemake.output.png).with_suffix(""))
+    parts = [
+        pd.DataFrame(s.positions, columns=["x", "y", "z"]).assign(method=name, reversed=shares[name])
+        for name, s in tissues.items()
+    ]
+    with atomic_path(Path(snakemake.output.data)) as path:
+        pd.concat(parts).to_csv(path, index=False, float_format="%.5g")

@@ -36,7 +36,8 @@ def build(folder, size):
     for start in range(0, len(runs), size):
         part = runs[start : start + size]
         shards.append(folder / "simulations" / f"{start}.nc")
-        write_shard(shards[-1], part, simulate_shard(part, by_name, MODEL, "draft"), MODEL, "draft", "c")
+        simulations, failures = simulate_shard(part, by_name, MODEL, "draft")
+        write_shard(shards[-1], part, simulations, MODEL, "draft", "c", failures)
     stack = folder / "dataset" / "fields.nc"
     build_stack(stack, shards, runs, by_name, 32, simulation_configuration="c", configuration="d")
     write_examples(folder / "dataset" / "examples.csv", augment(stack))

@@ -54,7 +54,7 @@ def simulate(
     tissue = run_simulation(shape, parameters, model, accuracy, seed)
     run = Run(0, shape.name, "test", False, parameters, seed)
     identity = content_hash([shape.as_feature(), delta, kappa_nnn, kappa_nnnn, layers, accuracy, seed])
-    write_shard(output, [run], [tissue], model, accuracy, identity)
+    write_shard(output, [run], {0: tissue}, model, accuracy, identity)
     state = "converged" if tissue.converged else "NOT converged"
     typer.echo(
         f"{output}: {tissue.cells} cells, energy {tissue.energy:.4g} kappa0 l0^2, {state}, "

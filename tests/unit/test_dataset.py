@@ -1,21 +1,24 @@
 """Design, shards, stack, examples, scaling, checks: on a data set made here, small but real."""
 
 import shutil
+from dataclasses import replace
 
 import netCDF4
 import numpy as np
 import pytest
 import shapely
 
+from raptor.dataset import shards
+from raptor.dataset.card import card
 from raptor.dataset.checks import check
 from raptor.dataset.design import read_design, sample_design
-from raptor.dataset.examples import augment, training_scaling
+from raptor.dataset.examples import augment, read_examples, training_scaling
 from raptor.dataset.same import differences
 from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
 from raptor.errors import RaptorError
-from raptor.moulds import Mould
+from raptor.moulds import Mould, read_moulds
 from raptor.parameters import CellParameters
 from raptor.symmetry import Element, apply
 from tests.small import CONFIG, build
@@ -199,3 +202,42 @@ def test_inputs_are_masks_and_constants_in_minus_one_to_one():
     assert inputs.shape == (5, 4, 4)
     assert set(np.unique(inputs[:2])) == {-1, 1}
     assert [float(c[0, 0]) for c in inputs[2:]] == pytest.approx([1, -1, -1])
+
+
+def test_a_failed_simulation_is_recorded_and_the_rest_survives(made, tmp_path, monkeypatch):
+    """One simulation raises, one gives NaN; the data set states both and is whole otherwise."""
+    folder = tmp_path / "unit"
+    really, tries = shards.simulate, []
+
+    def sometimes(mould, parameters, model, accuracy, seed):
+        number = next(run.simulation for run in design if run.seed == seed)
+        tries.append(number)
+        if number == 1:
+            raise MemoryError("no room")
+        made_one = really(mould, parameters, model, accuracy, seed)
+        return replace(made_one, energy=np.nan) if number == 4 else made_one
+
+    design = read_design(made / "design" / "design.csv")
+    monkeypatch.setattr(shards, "simulate", sometimes)
+    build(folder, 3)
+    assert tries == [0, 1, 1, 2, 3, 4, 4, 5]  # tried once more
+    found = shards.read_shard(folder / "simulations" / "0.nc")
+    assert [record.simulation for record in found.records] == [0, 2]
+    assert found.failures == {1: "MemoryError: no room"}
+    stack = folder / "dataset" / "fields.nc"
+    assert read_table(stack).simulation.tolist() == [0, 2, 3, 5]
+    assert check(folder) == []
+    parts = [shards.read_shard(folder / "simulations" / f"{n}.nc") for n in (0, 3)]
+    moulds = read_moulds(folder / "design" / "moulds.geojson")
+    examples = read_examples(folder / "dataset" / "examples.csv")
+    text = card("unit", design, moulds, parts, stack, examples)
+    assert "missing: 1 (MemoryError: no room); 4 (the solver met numbers that are not finite)" in text
+
+
+def test_a_split_without_simulations_stops_the_data_set(tmp_path, monkeypatch):
+    def never(*arguments):
+        raise ValueError("never")
+
+    monkeypatch.setattr(shards, "simulate", never)
+    with pytest.raises(RaptorError, match="every simulation of the split '[a-z]*' failed"):
+        build(tmp_path / "unit", 6)

@@ -54,6 +54,7 @@ def test_the_best_prediction_scores_one_and_another_run_root_two():
     assert reference.spread == pytest.approx(0.3, rel=0.02)
     assert reference.field_error(truth) == pytest.approx(1, rel=0.02)
     assert reference.field_error(runs[5]) == pytest.approx(np.sqrt(2), rel=0.02)
+    assert reference.field_error(runs[0]) == pytest.approx(np.sqrt(2), rel=0.02)  # not against itself
 
 
 def test_other_rasters_keep_the_sums():

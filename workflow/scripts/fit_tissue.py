@@ -29,7 +29,7 @@ with logged(snakemake.log[0]):
     write_shard(
         Path(snakemake.output.tissue),
         [run],
-        [simulation],
+        {0: simulation},
         model,
         params.accuracy,
         params.configuration,

@@ -15,15 +15,8 @@ with logged(snakemake.log[0]):
     params = snakemake.params
     model = NetworkModel(params.layers, tuple(params.shells), params.tension)
     with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:
-        simulations = simulate_shard(
-            runs,
-            moulds,
-            model,
-            params.accuracy,
-            lambda run, s: done(
-                f"{run.simulation}: {s.cells} cells, energy {s.energy:.5g}, "
-                f"{'converged' if s.converged else 'NOT converged'}, {s.wall_time:.2f} s"
-            ),
+        simulations, failures = simulate_shard(
+            runs, moulds, model, params.accuracy, lambda run, outcome: done(f"{run.simulation}: {outcome}")
         )
     write_shard(
         Path(snakemake.output.shard),
@@ -32,4 +25,5 @@ with logged(snakemake.log[0]):
         model,
         params.accuracy,
         params.configuration,
+        failures,
     )

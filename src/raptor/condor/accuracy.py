@@ -124,6 +124,10 @@ class Simulation:
         """Number of cells."""
         return len(self.sites)
 
+    def __str__(self) -> str:
+        state = "converged" if self.converged else "NOT converged"
+        return f"{self.cells} cells, energy {self.energy:.5g}, {state}, {self.wall_time:.2f} s"
+
 
 def simulate(
     mould: Mould,

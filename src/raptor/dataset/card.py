@@ -53,7 +53,7 @@ accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 ## Cost
 {hours:.3f} core-hours in all; {median:.2f} s a simulation in the median, {p95:.2f} s at the 95th
 percentile, on one core of {machine}. Not converged: {unconverged} of {simulations}. Folded bonds: at
-most {folded:.1e} of a tissue's.
+most {folded:.1e} of a tissue's. Simulations of the design that failed and are missing: {missing}.
 
 ## How to evaluate another simulator against it
 Simulate the moulds of `design/moulds.geojson` at the parameters of `design/design.csv`, rasterise as
@@ -75,9 +75,11 @@ def card(
     """The card, in Markdown."""
     table = read_table(stack)
     shard, times, folded, unconverged = None, [], 0.0, 0
+    failures: dict[int, str] = {}
     for shard in shards:
         times += [record.wall_time for record in shard.records]
-        folded = max(folded, *(record.folded_fraction for record in shard.records))
+        failures |= shard.failures
+        folded = max([folded, *(record.folded_fraction for record in shard.records)])
         unconverged += sum(not record.converged for record in shard.records)
     assert shard is not None  # a data set has at least one shard
     augmented = Counter(table.split[example.sample] for example in examples)
@@ -85,7 +87,7 @@ def card(
     learnt = simulated["train"] + simulated["validation"]
     return TEMPLATE.format(
         name=name,
-        simulations=len(runs),
+        simulations=len(table.split),
         split_rows=_rows([s, simulated[s], augmented[s] or "-"] for s in SPLITS),
         symmetry=", ".join(f"{k} {v}" for k, v in Counter(m.symmetry for m in moulds).most_common()),
         distinct=len(examples) / learnt,
@@ -105,6 +107,7 @@ def card(
         p95=np.percentile(times, 95),
         machine=f"{platform.machine()} with {os.cpu_count()} cores",
         unconverged=unconverged,
+        missing="; ".join(f"{n} ({reason})" for n, reason in sorted(failures.items())) or "none",
         folded=folded,
         references=REFERENCES,
     )

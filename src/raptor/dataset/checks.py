@@ -217,7 +217,9 @@ def check_against_shards(
     table = read_table(stack)
     rows = {int(simulation): row for row, simulation in enumerate(table.simulation)}
     by_id = {run.simulation: run for run in runs}
-    for missing in sorted(set(by_id) ^ set(rows)):
+    with open_file(stack) as file:
+        stated = {int(simulation) for simulation in str(getattr(file, "missing", "")).split()}
+    for missing in sorted(set(by_id) ^ set(rows) ^ stated):
         yield f"simulation {missing} is in only one of design.csv and {Path(stack).name}"
     uncovered = set(rows)
     for path in shards:

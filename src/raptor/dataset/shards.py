@@ -1,6 +1,8 @@
 """Shards: simulations as files, CF contiguous ragged arrays of cells."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +19,10 @@ from raptor.errors import RaptorError
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 
+log = logging.getLogger("raptor")
+
+ATTEMPTS = 2  # of a simulation that fails
+
 PARAMETERS = {
     "delta": "strength of the cell-matrix interaction",
     "kappa_nnn": "spring constant of the second kind of bond, in kappa0",
@@ -24,7 +30,7 @@ PARAMETERS = {
 }
 RESULTS = {
     "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
-    "wall_energy": "energy of the walls, in kappa0 l0^2",
+    "wall_energy": "energy of walls and contacts, in kappa0 l0^2",
     "gradient": "largest gradient left, by position or by orientation over delta, in kappa0 l0",
     "converged": "1 where the gradient fell below the solver's tolerance times delta",
     "folded_fraction": "share of bonds whose direction reversed since casting",
@@ -67,12 +73,13 @@ class Record:
 
 @dataclass(frozen=True)
 class Shard:
-    """The simulations of one file and the model that made them."""
+    """The simulations of one file, the model that made them, and why others failed, by id."""
 
     records: list[Record]
     model: NetworkModel
     accuracy: str
     configuration: str
+    failures: dict[int, str]
 
 
 def simulate_shard(
@@ -80,26 +87,51 @@ def simulate_shard(
     moulds: dict[str, Mould],
     model: NetworkModel,
     accuracy: str,
-    done: Callable[[Run, Simulation], None] = lambda run, simulation: None,
-) -> list[Simulation]:
-    """Simulate runs one after another; `done` is told of each."""
-    simulations = []
+    done: Callable[[Run, Simulation | str], None] = lambda run, outcome: None,
+) -> tuple[dict[int, Simulation], dict[int, str]]:
+    """Simulate runs one after another; returns simulations and reasons of failure, by id.
+
+    A run that fails is tried once more and then given up; the others go on. `done` is told of
+    each run its simulation or the reason why there is none.
+    """
+    simulations, failures = {}, {}
     for run in runs:
-        simulation = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
-        done(run, simulation)
-        simulations.append(simulation)
-    return simulations
+        outcome = _simulate(run, moulds, model, accuracy)
+        if isinstance(outcome, str):
+            failures[run.simulation] = outcome
+        else:
+            simulations[run.simulation] = outcome
+        done(run, outcome)
+    return simulations, failures
+
+
+def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Simulation | str:
+    """The simulation of a run, or why it failed."""
+    reason = ""
+    for _ in range(ATTEMPTS):
+        try:
+            made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
+        except Exception as error:  # whatever it is, the other runs of the shard go on
+            log.exception("simulation %d failed", run.simulation)
+            reason = f"{type(error).__name__}: {error}"
+        else:
+            if np.isfinite(made.energy) and np.isfinite(made.positions).all():
+                return made
+            reason = "the solver met numbers that are not finite"
+    return reason
 
 
 def write_shard(
     path: Path,
     runs: list[Run],
-    simulations: list[Simulation],
+    simulations: dict[int, Simulation],
     model: NetworkModel,
     accuracy: str,
     configuration: str,
+    failures: dict[int, str] | None = None,
 ) -> None:
-    """Write simulations as one shard, whole or not at all."""
+    """Write the simulations of runs, by id, as one shard, whole or not at all."""
+    failures = failures or {}
     with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
         file.featureType = "point"
         file.shells = np.array(model.shells, dtype=np.int32)
@@ -107,12 +139,20 @@ def write_shard(
         file.tension = model.tension
         file.accuracy = accuracy
         file.solver = accuracy_named(accuracy).solver
-        file.createDimension("simulation", len(runs))
-        file.createDimension("cell", sum(s.cells for s in simulations))
-        _write_simulations(file, runs, simulations)
-        columns = np.concatenate([_columns(s) for s in simulations]).astype(np.float32)
+        made = [run for run in runs if run.simulation in simulations]
+        ordered = [simulations[run.simulation] for run in made]
+        file.createDimension("simulation", len(made))
+        file.createDimension("cell", sum(s.cells for s in ordered))
+        _write_simulations(file, made, ordered)
+        empty = np.empty((0, len(CELL_VARIABLES)))
+        columns = np.concatenate([empty, *(_columns(s) for s in ordered)]).astype(np.float32)
         for (name, long_name), column in zip(CELL_VARIABLES.items(), columns.T, strict=True):
             variable(file, name, ("cell",), column, long_name)
+        if failures:
+            file.createDimension("failure", len(failures))
+            ids = np.array(list(failures), dtype=np.int32)
+            variable(file, "failed_simulation", ("failure",), ids, "simulation that failed")
+            variable(file, "failure_reason", ("failure",), list(failures.values()), "why it failed")
 
 
 def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]) -> None:
@@ -142,14 +182,21 @@ def _columns(simulation: Simulation) -> NDArray[np.float64]:
     )
 
 
-def read_shard(path: Path, configuration: str | None = None) -> Shard:
-    """Read a shard; with `configuration`, only one of that configuration.
+def read_failures(path: Path, configuration: str | None = None) -> dict[int, str]:
+    """Why simulations of a shard failed, by id; raises as `read_shard` does."""
+    with _open_shard(path, configuration) as file:
+        return _read_failures(file)
 
-    Raises
-    ------
-    RaptorError
-        Where the file is missing, cut short, incomplete, or of another configuration or model.
-    """
+
+def _read_failures(file: netCDF4.Dataset) -> dict[int, str]:
+    if "failure" not in file.dimensions:
+        return {}
+    reasons = zip(file["failed_simulation"][:], file["failure_reason"][:], strict=True)
+    return {int(simulation): str(reason) for simulation, reason in reasons}
+
+
+@contextmanager
+def _open_shard(path: Path, configuration: str | None) -> Iterator[netCDF4.Dataset]:
     with open_file(path) as file:
         if configuration is not None and (
             getattr(file, "configuration", None) != configuration
@@ -159,6 +206,18 @@ def read_shard(path: Path, configuration: str | None = None) -> Shard:
                 f"shard {path} was made by another configuration or model version; delete it and "
                 "run the workflow again"
             )
+        yield file
+
+
+def read_shard(path: Path, configuration: str | None = None) -> Shard:
+    """Read a shard; with `configuration`, only one of that configuration.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is missing, cut short, incomplete, or of another configuration or model.
+    """
+    with _open_shard(path, configuration) as file:
         try:
             shells = [int(shell) for shell in np.atleast_1d(file.shells)]
             model = NetworkModel(
@@ -166,7 +225,13 @@ def read_shard(path: Path, configuration: str | None = None) -> Shard:
                 (shells[0], shells[1], shells[2]),
                 str(file.tension),
             )
-            return Shard(_read_records(file), model, str(file.accuracy), str(file.configuration))
+            return Shard(
+                _read_records(file),
+                model,
+                str(file.accuracy),
+                str(file.configuration),
+                _read_failures(file),
+            )
         except (AttributeError, KeyError, IndexError, RuntimeError) as error:
             raise RaptorError(
                 f"shard {path} is incomplete ({error}); delete it and run the workflow again"
@@ -180,7 +245,9 @@ def _read_records(file: netCDF4.Dataset) -> list[Record]:
         raise IndexError(f"row_size counts {sizes.sum()} cells, the file holds {len(cells)}")
     values = {name: file[name][:] for name in ("simulation", "seed", *PARAMETERS, *RESULTS, "wall_time")}
     records = []
-    for row, block in enumerate(np.split(cells, np.cumsum(sizes)[:-1])):
+    ends = np.cumsum(sizes)
+    for row, (end, size) in enumerate(zip(ends, sizes, strict=True)):
+        block = cells[end - size : end]
         records.append(
             Record(
                 simulation=int(values["simulation"][row]),

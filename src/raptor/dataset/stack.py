@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.dataset.shards import PARAMETERS, Record, read_shard
+from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard
 from raptor.errors import RaptorError
 from raptor.fields import rasterise
 from raptor.moulds.geometry import Mould
@@ -61,19 +61,23 @@ def build_stack(
 ) -> None:
     """Rasterise every simulation of the shards into one file, sample by sample.
 
+    Simulations that failed are left out; attribute `missing` names them.
+
     Raises
     ------
     RaptorError
-        Where a shard is missing, cut short or of another configuration, or a simulation of the
-        design is in none of them.
+        Where a shard is missing, cut short or of another configuration, a simulation of the
+        design is in none of them, or all of a split failed.
     """
-    by_id = {run.simulation: run for run in runs}
+    shards = list(shards)
+    failed = _failed(shards, runs, simulation_configuration)
+    by_id = {run.simulation: run for run in runs if run.simulation not in failed}
     order = {simulation: row for row, simulation in enumerate(sorted(by_id))}
     left = set(by_id)
     with create(path, "CONDOR fields of tissues in tethered moulds", configuration) as file:
-        write = create_stack(file, len(runs), pixels)
-        shards = list(shards)
+        write = create_stack(file, len(by_id), pixels)
         file.shards = " ".join(Path(shard).name for shard in shards)
+        file.missing = " ".join(str(simulation) for simulation in sorted(failed))
         for shard_path in shards:
             for record in read_shard(shard_path, simulation_configuration).records:
                 if record.simulation not in left:
@@ -102,6 +106,18 @@ def build_stack(
                 done(row)
         if left:
             raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
+
+
+def _failed(shards: list[Path], runs: Sequence[Run], configuration: str) -> set[int]:
+    """Simulations that failed."""
+    failed = {simulation for path in shards for simulation in read_failures(path, configuration)}
+    for split in dict.fromkeys(run.split for run in runs):
+        if all(run.simulation in failed for run in runs if run.split == split):
+            raise RaptorError(
+                f"every simulation of the split '{split}' failed; see the logs of simulate_shard for why, "
+                "mend the design, and run the workflow again"
+            )
+    return failed
 
 
 def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[int, Sample], None]:

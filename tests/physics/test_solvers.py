@@ -5,7 +5,14 @@ import shapely
 from raptor.condor import Accuracy, accuracy_named, annealed, simulate
 from raptor.condor.accuracy import ACCURACIES
 from raptor.condor.anneal import anneal
-from raptor.condor.contract import Contraction, agitation_temperature, contract, refine, steps_to
+from raptor.condor.contract import (
+    FEWEST_STEPS,
+    Contraction,
+    agitation_temperature,
+    contract,
+    refine,
+    steps_to,
+)
 from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.minimise import minimise
@@ -120,7 +127,8 @@ def test_steps_shorten_bonds_by_the_same_part():
     shortened = 1 - left[1:] / left[:-1]
     assert shortened == pytest.approx(shortened[0])
     assert shortened[0] <= 0.3
-    assert steps_to(0.2, 0.3).tolist() == [0.2]  # an easy gel takes one step
+    assert len(steps_to(0.05, 0.3)) == FEWEST_STEPS  # an easy gel takes few
+    assert len(path) > len(steps_to(0.5, 0.3)) >= FEWEST_STEPS
     assert steps_to(0.9, 1.0).tolist() == [0.9]
 
 

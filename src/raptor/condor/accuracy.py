@@ -46,8 +46,8 @@ class Accuracy:
 
 ACCURACIES: dict[str, Accuracy] = {
     # Largest gradient left, over Delta: 0.03, 0.02, 0.001 kappa0 l0.
-    "draft": Accuracy("relax", Contraction(1.0, 0, 0.0, 3e-2, 1500)),
-    "standard": Accuracy("contract", Contraction(0.3, 30, 5e-3, 2e-2, 10000)),
+    "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, 3e-2, 1500)),
+    "standard": Accuracy("contract", Contraction(0.3, 50, 5e-3, 2e-2, 10000)),
     "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), rounds=5, round_sweeps=300),
 }
 """What `accuracy: draft | standard | reference` means."""
@@ -57,7 +57,7 @@ ALLOWED = "draft, standard, reference, anneal-SWEEPS and anneal-SWEEPS-minimised
 
 def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
     """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
-    last = Contraction(1.0, 0, 0.0, 1e-3, 30000 if minimised else 1)
+    last = Contraction(1.0, 0, -1.0, 1e-3, 30000 if minimised else 1)
     return Accuracy("anneal", last, cold_sweeps=sweeps)
 
 

@@ -27,6 +27,7 @@ ENERGY_OF_TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: 
 ENERGY_OF_FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
 WARMTH_OF_ROUNDS = 2.0  # times the temperature of agitation
 COOLING = 10.0  # from the first to the last temperature of an agitation
+FEWEST_STEPS = 3  # so that orientations are agitated more than once
 CONTACT = 100.0  # kappa0, as the walls
 
 
@@ -42,8 +43,8 @@ class Contraction:
     sweeps : int
         Metropolis sweeps of each step before it is minimised.
     settled : float
-        A step before the last is left when 25 more evaluations lower the energy by less than
-        this part.
+        A step is left when 25 more evaluations lower the energy by no more than this part; the
+        last one must meet the tolerance too. Less than zero: the tolerance alone counts.
     tolerance : float
         Largest component of the gradient at the end, in kappa0 l0 times Delta.
     limit : int
@@ -67,10 +68,14 @@ def agitation_temperature(delta: float) -> float:
 
 
 def steps_to(delta: float, shortening: float) -> NDArray[np.float64]:
-    """Values of Delta, (steps,), up to delta, each shortening 1 - Delta by at most a given part."""
+    """Values of Delta, (steps,), up to delta, each shortening 1 - Delta by the same part.
+
+    That part is at most `shortening`, and there are at least `FEWEST_STEPS`.
+    """
     if shortening >= 1 or delta == 0:
         return np.array([delta])
     count = math.ceil(math.log(1 - delta) / math.log(1 - shortening) - 1e-9)
+    count = max(count, FEWEST_STEPS)
     return np.append(1 - (1 - delta) ** (np.arange(1, count) / count), delta)
 
 
@@ -136,7 +141,8 @@ def _minimise(
         system.walls,
         delta,
         tolerance=contraction.tolerance,
-        settled=0.0 if last else contraction.settled,
+        settled=contraction.settled,
+        thorough=last and contraction.settled >= 0,
         contact=contact,
         limit=contraction.limit,
     )

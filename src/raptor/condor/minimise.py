@@ -194,19 +194,21 @@ def _search_kernel(state, total, slope, length, network, walls, delta, contact, 
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, settled, limit, work):
+def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, settled, thorough, limit, work):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(state, work.gradient, network, walls, delta, contact, work.scratch)
     used = 1
     stored = 0
     newest = -1
     memory = work.sg.size
-    looked, energy_then = used, energy + walled
-    while used < limit and _largest(work.gradient) > tolerance:
+    looked, energy_then, calm = used, energy + walled, False
+    while used < limit:
         if used - looked >= WINDOW:
-            if energy_then - energy - walled < settled * (energy + walled):
-                break
+            calm = energy_then - energy - walled <= settled * (energy + walled)
             looked, energy_then = used, energy + walled
+        small = _largest(work.gradient) <= tolerance
+        if (small and calm) if thorough else (small or calm):
+            break
         slope = _direction_kernel(work, stored, newest)
         if slope >= 0.0:
             stored = 0
@@ -253,7 +255,8 @@ def minimise(
     delta: float,
     *,
     tolerance: float,
-    settled: float = 0.0,
+    settled: float = -1.0,
+    thorough: bool = False,
     contact: float = 0.0,
     limit: int,
 ) -> Minimum:
@@ -265,8 +268,10 @@ def minimise(
         Largest component of the gradient at which the state has converged, in units of
         kappa0 l0 times `orientation_lever(delta)`.
     settled : float
-        The state is left, though not converged, when `WINDOW` evaluations lower the energy by
-        less than this part.
+        The state is left, though not converged, when `WINDOW` evaluations lower the energy by no
+        more than this part.
+    thorough : bool
+        Leave it only when both tolerance and `settled` are met.
     contact : float
         Stiffness of contacts (kappa0), as in `objective`.
     limit : int
@@ -296,7 +301,7 @@ def minimise(
         scratch=scratch(state.size // 6, state.dtype),
     )
     energy, walled, gradient, used = _minimise_kernel(
-        state, network, walls, delta, contact, lever, tolerance * lever, settled, limit, work
+        state, network, walls, delta, contact, lever, tolerance * lever, settled, thorough, limit, work
     )
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
     return Minimum(

@@ -91,15 +91,31 @@ def predict(
 
 
 @app.command()
+def well(
+    stack: Annotated[Path, typer.Argument(help="dataset/fields.nc of a results folder")],
+    folder: Annotated[Path, typer.Argument(help="where data/train, data/valid and data/test are put")],
+) -> None:
+    """Write a field stack in the HDF5 layout of The Well, one file a split."""
+    from raptor.dataset.well import write_well
+
+    for path in write_well(stack, folder):
+        typer.echo(path)
+
+
+@app.command()
 def check(
     path: Annotated[Path, typer.Argument(help="results folder, shard or field stack")],
+    part: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="of a folder's simulations, chosen at random, to compute again"),
+    ] = 1.0,
 ) -> None:
     """Hold a data set, a shard or a field stack against its rules; name every fault."""
     from raptor.dataset.checks import check as find_faults
 
     if not path.exists():
         raise RaptorError(f"{path} does not exist; check the path")
-    faults = find_faults(path)
+    faults = find_faults(path, part)
     for fault in faults:
         typer.echo(fault)
     typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")

@@ -150,6 +150,9 @@ class Dataset(Block):
     """What is written beside the unaugmented stack."""
 
     materialise: bool = Field(False, description="also write the augmented stack, for other tools")
+    checked: float = Field(
+        1.0, gt=0, le=1, description="part of the simulations, chosen at random, computed again by the check"
+    )
 
 
 class Surrogate(Block):

@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
@@ -17,10 +18,11 @@ from raptor.dataset.same import differences
 from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
+from raptor.dataset.well import write_well
 from raptor.errors import RaptorError
 from raptor.moulds import Mould, read_moulds
 from raptor.parameters import CellParameters
-from raptor.symmetry import Element, apply
+from raptor.symmetry import FIELDS, Element, apply
 from tests.small import CONFIG, build
 
 
@@ -239,5 +241,46 @@ def test_a_split_without_simulations_stops_the_data_set(tmp_path, monkeypatch):
         raise ValueError("never")
 
     monkeypatch.setattr(shards, "simulate", never)
-    with pytest.raises(RaptorError, match="every simulation of the split '[a-z]*' failed"):
+    with pytest.raises(RaptorError, match=r"every simulation of the split '\w+' failed"):
         build(tmp_path / "unit", 6)
+
+
+def test_the_wells_layout_holds_the_same_fields(made, tmp_path):
+    stack = made / "dataset" / "fields.nc"
+    table = read_table(stack)
+    paths = write_well(stack, tmp_path)
+    assert [path.relative_to(tmp_path).parts[1] for path in paths] == ["train", "valid", "test"]
+    with h5py.File(paths[0]) as file:
+        rows = table.rows("train")
+        assert file.attrs["n_trajectories"] == len(rows)
+        assert file.attrs["n_spatial_dims"] == 2
+        assert list(file["dimensions"].attrs["spatial_dims"]) == ["x", "y"]
+        assert set(file) >= {"boundary_conditions", "dimensions", "scalars"}
+        for row, sample in enumerate(read_samples(stack, rows)):
+            fields = dict(zip(FIELDS, sample.fields, strict=True))
+            assert file["scalars/delta"][row] == pytest.approx(sample.parameters.delta)
+            assert np.array_equal(file["t0_fields/density"][row, 0], fields["density"].T)
+            assert np.array_equal(file["t0_fields/tethers"][row, 0], sample.tethers.T)
+            assert np.array_equal(file["t1_fields/out_of_plane"][row, 0, ..., 1], fields["sysz"].T)
+            tensor = file["t2_fields/orientation"][row, 0]
+            assert np.array_equal(tensor[..., 0, 1], fields["sxsy"].T)
+            assert np.array_equal(tensor[..., 1, 1], fields["sysy"].T)
+            trace = tensor[..., 0, 0] + tensor[..., 1, 1] + file["t0_fields/szsz"][row, 0]
+            assert trace == pytest.approx(file["t0_fields/density"][row, 0], abs=1e-5)
+        for order in (0, 1, 2):
+            group = file[f"t{order}_fields"]
+            assert sorted(group.attrs["field_names"]) == sorted(group)
+            for field in group.values():
+                assert {"dim_varying", "sample_varying", "time_varying"} <= set(field.attrs)
+
+
+def test_a_part_of_the_simulations_is_computed_again(folder):
+    def spoil(energy):
+        energy += 1
+
+    for shard in (folder / "simulations").glob("*.nc"):
+        edit(shard, "energy", spoil)
+    everything, half = check(folder), check(folder, 0.5)
+    assert len(everything) == 6
+    assert len(half) == 3
+    assert all("energy is" in fault for fault in everything + half)

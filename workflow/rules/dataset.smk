@@ -69,6 +69,7 @@ rule check_dataset:
         mem_mb=1500,
     params:
         folder=lambda wildcards, input: str(Path(input.stack).parents[1]),
+        part=CONFIG.dataset.checked,
     script:
         "../scripts/check_dataset.py"
 

@@ -8,7 +8,7 @@ from raptor.files import atomic_path
 from raptor.jobs import logged
 
 with logged(snakemake.log[0]):
-    faults = check(Path(snakemake.params.folder))
+    faults = check(Path(snakemake.params.folder), snakemake.params.part)
     if faults:
         raise RaptorError("; ".join(faults))
     with atomic_path(Path(snakemake.output.checked)) as path:

@@ -91,6 +91,16 @@ def predict(
 
 
 @app.command()
+def progress(
+    folder: Annotated[Path, typer.Argument(help="results folder, for instance results/paper")],
+) -> None:
+    """Tell how many of a data set's simulations are done, at what rate, and the time left."""
+    from raptor.dataset.progress import progress_of
+
+    typer.echo(f"{folder}: {progress_of(folder)}")
+
+
+@app.command()
 def well(
     stack: Annotated[Path, typer.Argument(help="dataset/fields.nc of a results folder")],
     folder: Annotated[Path, typer.Argument(help="where data/train, data/valid and data/test are put")],

@@ -14,6 +14,7 @@ from raptor.dataset.card import card
 from raptor.dataset.checks import check
 from raptor.dataset.design import read_design, sample_design
 from raptor.dataset.examples import augment, read_examples, training_scaling
+from raptor.dataset.progress import progress_of
 from raptor.dataset.same import differences
 from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
@@ -284,3 +285,13 @@ def test_a_part_of_the_simulations_is_computed_again(folder):
     assert len(everything) == 6
     assert len(half) == 3
     assert all("energy is" in fault for fault in everything + half)
+
+
+def test_progress_counts_what_is_done(folder):
+    assert progress_of(folder).done == 6
+    assert progress_of(folder).seconds_left == 0
+    (folder / "simulations" / "4.nc").unlink()
+    half = progress_of(folder)
+    assert (half.designed, half.done, half.failed) == (6, 4, 0)
+    assert 0 < half.seconds_left < float("inf")
+    assert str(half).startswith("4 of 6 simulations done, 0 failed, ")

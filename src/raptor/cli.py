@@ -31,7 +31,7 @@ def simulate(
     output: Output,
     layers: Annotated[int, typer.Option(help="cell layers between floor and fill height")] = 7,
     accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of the first orientations")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of every random number")] = 0,
 ) -> None:
     """Simulate one mould and write a file of the form of a shard.
 

@@ -195,13 +195,12 @@ class TradeoffCase(Block):
     delta: float = Field(description="cell-matrix interaction")
     kappa_nnn: float = Field(description="second spring constant, kappa0")
     kappa_nnnn: float = Field(description="third spring constant, kappa0")
-    layers: int | None = Field(None, description="layers, where not model.layers")
+    layers: int | None = Field(None, ge=1, le=64, description="layers, where not model.layers")
     methods: tuple[Method, ...] = Field((), description="further methods, of this case alone")
 
     @model_validator(mode="after")
     def _consistent(self) -> "TradeoffCase":
         CellParameters(self.delta, self.kappa_nnn, self.kappa_nnnn)
-        NetworkModel(self.layers or 1)
         return self
 
 
@@ -214,9 +213,9 @@ class Tradeoff(Block):
     methods: tuple[Method, ...] = Field(
         ("draft", "standard", "anneal-1e3"), description="accuracies to compare"
     )
-    layers: tuple[int, ...] = Field((), description="other numbers of layers to compare")
+    layers: tuple[Positive, ...] = Field((), description="other numbers of layers to compare")
     shells: tuple[tuple[int, int, int], ...] = Field((), description="other shells to compare")
-    pixels: tuple[int, ...] = Field((), description="other rasters to compare")
+    pixels: tuple[Positive, ...] = Field((), description="other rasters to compare")
     seeds: int = Field(4, ge=4, description="reference runs that measure the seed-to-seed spread")
     surrogate: bool = Field(True, description="compare the trained surrogate too")
     folding_case: Name = Field("soft", description="case whose folded and unfolded state are drawn")
@@ -289,7 +288,7 @@ class Configuration(Block):
     def comparison(self, case: TradeoffCase) -> dict[str, Any]:
         """All that the comparison on one case hangs on, for the rule that makes it."""
         model = self.model.model_dump(mode="json")
-        model["layers"] = case.layers or self.model.layers
+        model["layers"] = self.model.layers if case.layers is None else case.layers
         shared = self.tradeoff.model_dump(
             mode="json", include={"methods", "layers", "shells", "pixels", "seeds"}
         )

@@ -41,10 +41,12 @@ def test_random_numbers_are_uniform_and_hang_on_their_place_alone():
 
 
 def test_the_circle_is_round():
-    parts = np.linspace(-0.5, 0.5, WIDTH)
     out = np.zeros((2, WIDTH))
-    _circle(out, parts)
-    assert out == pytest.approx(np.array([np.cos(2 * np.pi * parts), np.sin(2 * np.pi * parts)]), abs=1e-8)
+    for parts in np.linspace(-0.5, 0.5, 500 * WIDTH).reshape(-1, WIDTH):
+        _circle(out, parts)
+        wanted = np.array([np.cos(2 * np.pi * parts), np.sin(2 * np.pi * parts)])
+        assert out == pytest.approx(wanted, abs=1e-4)
+        assert (out**2).sum(axis=0) == pytest.approx(1)
 
 
 def test_proposals_move_evenly_and_turn_alike_in_all_directions():

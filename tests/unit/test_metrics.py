@@ -50,11 +50,13 @@ def test_spontaneous_signs_are_left_out():
 def test_the_best_prediction_scores_one_and_another_run_root_two():
     truth = RNG.normal(size=(8, 1, 1)) * np.ones((8, 100, 100))
     runs = [truth + 0.3 * RNG.normal(size=truth.shape) for _ in range(6)]
-    reference = Reference(runs[:5], np.zeros(2))
+    reference = Reference(runs[:5], np.arange(10.0).reshape(5, 2))
     assert reference.spread == pytest.approx(0.3, rel=0.02)
     assert reference.field_error(truth) == pytest.approx(1, rel=0.02)
     assert reference.field_error(runs[5]) == pytest.approx(np.sqrt(2), rel=0.02)
-    assert reference.field_error(runs[0]) == pytest.approx(np.sqrt(2), rel=0.02)  # not against itself
+    assert reference.field_error(runs[0], 0) == pytest.approx(np.sqrt(2), rel=0.02)  # not against itself
+    assert reference.shape_error(np.array([5.0, 5.0])) == pytest.approx([1, 0])
+    assert reference.shape_error(np.array([0.0, 1.0]), 0) == pytest.approx([-5, -5])
 
 
 def test_other_rasters_keep_the_sums():

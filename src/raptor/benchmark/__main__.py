@@ -51,7 +51,7 @@ def main(
     for name, parameters in (("middle", MIDDLE), ("soft", SOFT)):
         found = compare_preconditioners(mould, parameters, model, at)
         compared = [(p.name, *(f"{e:.2f}" for e in p.energies), f"{p.milliseconds:.2f}") for p in found]
-        heads = ("preconditioner", *(f"E after {n}" for n in at), "ms a step")
+        heads = ("preconditioner", *(f"E after {n}" for n in at), "ms an application")
         _print(f"L-BFGS with preconditioners, a step of the {name} case", heads, compared)
     _print_levels(mould, model, 2 if quick else SEEDS)
     _print_scaling((300, 600) if quick else (1000, 3000, 10000, 30000, 100000), 1 if quick else 3)

@@ -18,6 +18,7 @@ from raptor.benchmark.baselines import (
 from raptor.benchmark.machine import arithmetic_rate, copy_rate, root_rate, seconds
 from raptor.condor.anneal import anneal
 from raptor.condor.energy import _objective_kernel, scratch
+from raptor.condor.lanes import lanes
 from raptor.condor.lattice import Lattice
 from raptor.condor.system import System, build_system, cast_state
 from raptor.errors import RaptorError
@@ -90,10 +91,10 @@ def _seconds_of_gradient(state: NDArray[Any], system: System, delta: float) -> f
 
 
 def trial_rates(mould: Mould, parameters: CellParameters, model: NetworkModel) -> Iterator[Rate]:
-    """Trial moves a second; all at one temperature, with proposals of about the same size."""
+    """Trial moves a second at one temperature; ours with walls and proposals that adapt."""
     delta, temperature = parameters.delta, 1e-3
     lattice = build_system(mould, parameters, model).lattice
-    state, table, rng = cast_state(lattice, np.random.default_rng(0)), neighbour_table(lattice), None
+    state, table = cast_state(lattice, np.random.default_rng(0)), neighbour_table(lattice)
     rng = np.random.default_rng(0)
 
     def plain() -> None:
@@ -129,7 +130,7 @@ def bounds(system: System, precision: Any) -> list[Bound]:
 
     Operations are counted for all lanes, also those that hold no bond.
     """
-    filled = system.lattice.bonds / (len(system.network.bits) * (64 // np.dtype(precision).itemsize))
+    filled = system.lattice.bonds / (len(system.network.bits) * lanes(precision))
     arithmetic, roots = arithmetic_rate(precision), root_rate(precision)
     moved = MOVED * np.dtype(precision).itemsize
     size = 2 * 6 * system.lattice.cells * np.dtype(precision).itemsize  # state and forces

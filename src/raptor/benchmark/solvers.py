@@ -13,15 +13,22 @@ from scipy.sparse.linalg import spilu, splu
 
 from raptor.condor.accuracy import simulate
 from raptor.condor.contract import steps_to
-from raptor.condor.energy import objective, unit_orientations
-from raptor.condor.minimise import MAX_STEP, minimise, orientation_lever
+from raptor.condor.energy import _objective_kernel, scratch, unit_orientations
+from raptor.condor.minimise import (
+    BACKTRACKS,
+    MAX_STEP,
+    MAX_TURN,
+    MEMORY,
+    SUFFICIENT,
+    minimise,
+    orientation_lever,
+)
 from raptor.condor.system import System, build_system, cast_state
 from raptor.moulds.geometry import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
 
 Array = NDArray[np.float64]
 Inverse = Callable[[Array], Array]
-MEMORY = 8
 SHIFT = 1e-3  # of the elastic stiffness, kappa0: what holds a gel without tethers
 GRID = 4.0  # spacing of the coarse grid, l0
 
@@ -74,8 +81,12 @@ def _scaled(state: Array, lever: float) -> Array:
 
 
 def _scaled_objective(system: System, delta: float) -> Callable[[Array], tuple[float, Array]]:
+    """The kernel that `minimise` calls, with arrays made once, as SciPy calls it."""
+    work = scratch(system.lattice.cells)
+
     def evaluate(state: Array) -> tuple[float, Array]:
-        energy, walled, gradient = objective(state, system.network, system.walls, delta)
+        gradient = np.empty_like(state)
+        energy, walled = _objective_kernel(state, gradient, system.network, system.walls, delta, 0.0, work)
         return energy + walled, gradient
 
     return evaluate
@@ -138,7 +149,7 @@ def _coarse_grid(sites: Array) -> sparse.csc_matrix:
 
 @dataclass(frozen=True)
 class Preconditioned:
-    """Energies after so many evaluations with a preconditioner, and its cost a step."""
+    """Energies after so many evaluations with a preconditioner, and the cost of applying it once."""
 
     name: str
     energies: list[float]
@@ -166,7 +177,7 @@ def compare_preconditioners(
 def _preconditioned_lbfgs(
     system: System, state: Array, delta: float, inverse: Inverse, evaluations: int
 ) -> list[float]:
-    """Least energy after each evaluation; the algorithm of `minimise`, in NumPy."""
+    """Least energy after each evaluation, by an L-BFGS like `minimise` in NumPy that halves steps."""
     lever = orientation_lever(delta)
     evaluate, x = _scaled_objective(system, delta), _scaled(state, lever)
     half = x.size // 2
@@ -178,13 +189,14 @@ def _preconditioned_lbfgs(
         if d @ g >= 0:
             pairs = []
             d = -_two_loops(g, pairs, inverse)
-        longest = MAX_STEP / max(np.abs(d[:half]).max(), np.abs(d[half:]).max() / (3 * lever), 1e-30)
+        turn = np.abs(d[half:]).max() / lever
+        longest = min(MAX_STEP / np.abs(d[:half]).max(), MAX_TURN / turn)
         length = min(1.0 if pairs else 0.1 * longest, longest)
-        for _ in range(12):
+        for _ in range(BACKTRACKS):
             trial = x + length * d
             trial_energy, trial_g = evaluate(trial)
             history.append(min(history[-1], trial_energy))
-            if trial_energy <= energy + 1e-4 * length * (d @ g):
+            if trial_energy <= energy + SUFFICIENT * length * (d @ g):
                 break
             length *= 0.5
         else:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from raptor.condor.anneal import anneal
 from raptor.condor.contract import Contraction, contract, refine, steps_to
-from raptor.condor.energy import cell_tension, folded_fraction
+from raptor.condor.energy import cell_tension, folded_fraction, objective
 from raptor.condor.minimise import Minimum
 from raptor.condor.system import System, build_system, cast_state
+from raptor.condor.walls import NO_WALLS
 from raptor.errors import RaptorError
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
@@ -30,8 +31,10 @@ class Accuracy:
         How closely the contraction is followed, and its tolerance.
     rounds, round_sweeps : int
         Rounds of agitation and minimisation after the contraction, and the sweeps of each.
-    cold_sweeps : int
+    anneal_sweeps : int
         Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
+    minimised : bool
+        Whether the last state is a minimum; a bare anneal's is not.
     precision : str
         "float64" or "float32".
     """
@@ -40,7 +43,8 @@ class Accuracy:
     contraction: Contraction
     rounds: int = 0
     round_sweeps: int = 0
-    cold_sweeps: int = 0
+    anneal_sweeps: int = 0
+    minimised: bool = True
     precision: str = "float64"
 
 
@@ -58,7 +62,7 @@ ALLOWED = "draft, standard, reference, anneal-SWEEPS and anneal-SWEEPS-minimised
 def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
     """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
     last = Contraction(1.0, 0, -1.0, 1e-3, 30000 if minimised else 1)
-    return Accuracy("anneal", last, cold_sweeps=sweeps)
+    return Accuracy("anneal", last, anneal_sweeps=sweeps, minimised=minimised)
 
 
 def accuracy_named(name: str) -> Accuracy:
@@ -69,15 +73,15 @@ def accuracy_named(name: str) -> Accuracy:
     RaptorError
         Where there is no such accuracy.
     """
-    base, single, _ = name.partition("-float32")
-    anneal_of = re.fullmatch(r"anneal-([1-9]\d*(?:e\d)?)(-minimised)?", base)
+    base = name.removesuffix("-float32")
+    anneal_of = re.fullmatch(r"anneal-([1-9]\d{0,8}|[1-9]e[1-8])(-minimised)?", base)
     if anneal_of:
         accuracy = annealed(int(float(anneal_of[1])), bool(anneal_of[2]))
     elif base in ACCURACIES:
         accuracy = ACCURACIES[base]
     else:
         raise RaptorError(f"accuracy is '{name}'; allowed are {ALLOWED}")
-    return replace(accuracy, precision="float32") if single else accuracy
+    return replace(accuracy, precision="float32") if name != base else accuracy
 
 
 @dataclass(frozen=True)
@@ -92,10 +96,12 @@ class Simulation:
         Unit vectors; s and -s are the same cell.
     tension : ndarray (cells,)
         Mean over each cell's bonds, kappa0 l0.
-    energy, wall_energy : float
-        Of the bonds and of the walls, kappa0 l0^2.
+    energy, wall_energy, contact_energy : float
+        Of the bonds, of the walls, and of the contacts that keep bonds from reversing, kappa0 l0^2.
+        Where the last is not zero, the state is a minimum with those contacts, not without.
     gradient : float
-        Largest component of the gradient left, by position or by orientation over Delta, kappa0 l0.
+        Largest component of the gradient left, contacts included, by position or by orientation
+        over Delta (at least 0.02), kappa0 l0.
     converged : bool
         Whether the gradient fell below the tolerance; never true for a bare anneal.
     folded_fraction : float
@@ -112,6 +118,7 @@ class Simulation:
     tension: NDArray[np.float64]
     energy: float
     wall_energy: float
+    contact_energy: float
     gradient: float
     converged: bool
     folded_fraction: float
@@ -154,6 +161,7 @@ def simulate(
     lattice = system.lattice
     minimum, sweeps = _solve(system, parameters.delta, accuracy, rng)
     state = minimum.state.astype(np.float64)
+    touching = _contact_energy(minimum, system, parameters.delta)
     if not mould.tethers:
         state = _undrifted(state, lattice.sites, mould)
     return Simulation(
@@ -162,14 +170,22 @@ def simulate(
         orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),
         tension=cell_tension(state, lattice, parameters.delta, model.tension),
         energy=minimum.energy,
-        wall_energy=minimum.walled,
+        wall_energy=minimum.walled - touching,
+        contact_energy=touching,
         gradient=minimum.gradient,
-        converged=minimum.converged,
+        converged=minimum.converged and accuracy.minimised,
         folded_fraction=folded_fraction(state, lattice),
         gradient_evaluations=minimum.evaluations,
         sweeps=sweeps,
         wall_time=time.perf_counter() - started,
     )
+
+
+def _contact_energy(minimum: Minimum, system: System, delta: float) -> float:
+    """Energy of the contacts that a minimum was found with."""
+    if minimum.contact == 0:
+        return 0.0
+    return objective(minimum.state, system.network, NO_WALLS, delta, minimum.contact)[1]
 
 
 def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
@@ -193,7 +209,7 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
 def _solve(system: System, delta: float, accuracy: Accuracy, rng: Generator) -> tuple[Minimum, int]:
     """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
     state = cast_state(system.lattice, rng).astype(accuracy.precision)
-    sweeps = accuracy.cold_sweeps
+    sweeps = accuracy.anneal_sweeps
     if sweeps:
         annealed = anneal(state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps)
         state = annealed.state

@@ -23,8 +23,8 @@ from raptor.condor.energy import folded_fraction
 from raptor.condor.minimise import Minimum, minimise
 from raptor.condor.system import System
 
-ENERGY_OF_TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: melts orientations
-ENERGY_OF_FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
+TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: orientations shake
+FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
 WARMTH_OF_ROUNDS = 2.0  # times the temperature of agitation
 COOLING = 10.0  # from the first to the last temperature of an agitation
 FEWEST_STEPS = 3  # so that orientations are agitated more than once
@@ -59,12 +59,12 @@ class Contraction:
 
 
 def agitation_temperature(delta: float) -> float:
-    """Temperature at which orientations melt but bonds do not fold, kappa0 l0^2.
+    """Temperature at which orientations shake and few bonds fold, kappa0 l0^2.
 
     Energies of turning grow as Delta^2; a bond of natural length l0 (1 - Delta) reverses when thermal
     motion covers that length.
     """
-    return min(ENERGY_OF_TURNING * delta**2, ENERGY_OF_FOLDING * (1 - delta) ** 2)
+    return min(TURNING * delta**2, FOLDING * (1 - delta) ** 2)
 
 
 def steps_to(delta: float, shortening: float) -> NDArray[np.float64]:
@@ -152,6 +152,8 @@ def agitate(
     state: NDArray[Any], system: System, delta: float, sweeps: int, rng: Generator, warmth: float = 1.0
 ) -> NDArray[Any]:
     """The state after a short anneal from `warmth` times the temperature of agitation."""
+    if delta == 0:
+        return state
     return anneal(
         state,
         system.order,
@@ -160,7 +162,7 @@ def agitate(
         delta,
         rng,
         sweeps=sweeps,
-        initial_temperature=max(warmth * agitation_temperature(delta), 1e-9),
+        initial_temperature=warmth * agitation_temperature(delta),
         temperature_factor=COOLING,
     ).state
 
@@ -175,7 +177,7 @@ def refine(
     rounds: int,
     sweeps: int,
 ) -> Minimum:
-    """Agitate and minimise again and again, keeping what ends lower.
+    """Agitate and minimise again and again, keeping what ends lower, converged and unfolded.
 
     Basin hopping (D. Wales and J. Doye, J. Phys. Chem. A 101, 5111, 1997, doi:10.1021/jp970984n):
     removes boundaries between domains of orientation.
@@ -186,6 +188,9 @@ def refine(
         found = _minimise(agitated, system, delta, contraction, last=True)
         found = _unfolded(found, minimum.state, system, delta, contraction, last=True)
         used += found.evaluations
-        if found.energy + found.walled < minimum.energy + minimum.walled:
+        lower = found.energy + found.walled < minimum.energy + minimum.walled
+        folded = folded_fraction(found.state, system.lattice)
+        unfolded = folded <= folded_fraction(minimum.state, system.lattice)
+        if lower and unfolded and found.converged >= minimum.converged:
             minimum = found
     return minimum._replace(evaluations=used)

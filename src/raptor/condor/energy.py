@@ -28,6 +28,7 @@ from raptor.errors import RaptorError
 
 SOFTENING = 1e-12  # l0^2, added to |l|^2: two cells on top of each other keep a finite force
 CONTACT_LENGTH = 0.01  # of a bond's rest length
+SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 
 
 def natural_length(rest_length, delta, squares):
@@ -164,7 +165,7 @@ def _objective_kernel(state, gradient, network, walls, delta, contact, work):
 
 
 @kernel
-def _stretch_kernel(state, first, second, stiffness, rest, delta, hooke, tension):
+def _tension_kernel(state, first, second, stiffness, rest, delta, hooke, tension):
     """Sum over each cell's bonds of the tension, for unit orientations."""
     cells = tension.size
     for bond in range(first.size):
@@ -222,7 +223,7 @@ def cell_tension(
     `kind` is "hooke", k (|l| - L'), or "literal", k L' (paper, after equation 2).
     """
     total = np.zeros(lattice.cells)
-    _stretch_kernel(
+    _tension_kernel(
         unit_orientations(state),
         lattice.first,
         lattice.second,

@@ -51,7 +51,7 @@ def where(bits: int, number: float, like: Any) -> Any:
 
 
 def positive(value: Any) -> Any:
-    """Each lane, or zero where it is less."""
+    """Each lane, or zero where it is less; NaN stays NaN."""
     return np.maximum(value, 0)
 
 
@@ -150,7 +150,7 @@ def _where(typing, bits, number, like):
 def _positive(typing, value):
     def generate(context, builder, signature, arguments):
         zero = ir.Constant(arguments[0].type, [0.0] * value.count)
-        return builder.select(builder.fcmp_ordered(">", arguments[0], zero), arguments[0], zero)
+        return builder.select(builder.fcmp_ordered("<=", arguments[0], zero), zero, arguments[0])
 
     return value(value), generate
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.compiled import kernel
-from raptor.condor.energy import Scratch, _objective_kernel, scratch, unit_orientations
+from raptor.condor.energy import SMALLEST_LEVER, Scratch, _objective_kernel, scratch, unit_orientations
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls
 from raptor.errors import RaptorError
@@ -22,7 +22,6 @@ from raptor.errors import RaptorError
 MEMORY = 8  # pairs of steps that the inverse Hessian is built from
 MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell
 MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
-SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
 WINDOW = 25  # evaluations over which the fall of the energy is judged
@@ -34,7 +33,8 @@ class Minimum(NamedTuple):
 
     `state` as in `energy`, `energy` of the bonds and `walled` of walls and contacts (kappa0 l0^2),
     `gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
-    `evaluations` of the objective, and whether the gradient fell below the tolerance.
+    `evaluations` of the objective, whether the gradient fell below the tolerance, and the stiffness
+    of the contacts that were held (kappa0).
     """
 
     state: NDArray[Any]
@@ -43,6 +43,7 @@ class Minimum(NamedTuple):
     gradient: float
     evaluations: int
     converged: bool
+    contact: float = 0.0
 
 
 class _Work(NamedTuple):
@@ -82,6 +83,19 @@ def _largest(a):
 
 
 @kernel
+def _left_kernel(state, gradient, lever):
+    """Largest component of the gradient, that by orientations as for vectors of the lever's length."""
+    n = state.size // 6
+    left = float(_largest(gradient[: 3 * n]))
+    for i in range(3 * n, 4 * n):
+        a, b, c = state[i], state[i + n], state[i + 2 * n]
+        length = math.sqrt(a * a + b * b + c * c)
+        turn = max(abs(gradient[i]), abs(gradient[i + n]), abs(gradient[i + 2 * n]))
+        left = max(left, turn * length / lever)
+    return left
+
+
+@kernel
 def _longest_step(direction, lever):
     """The longest multiple of a direction that keeps every move and turn within bounds."""
     half = direction.size // 2
@@ -91,8 +105,8 @@ def _longest_step(direction, lever):
 
 
 @kernel
-def _remember_kernel(state, work, slot, stored):
-    """Go to the trial state, and store the step that led there as pair `slot`."""
+def _remember_kernel(state, work, slot, written):
+    """Go to the trial state, and store the step that led there as pair `slot` of those `written`."""
     work.sg[:] = 0.0
     work.yg[:] = 0.0
     work.sy[slot, :] = 0.0
@@ -109,7 +123,7 @@ def _remember_kernel(state, work, slot, stored):
             y[i] = new_g[i] - g[i]
             x[i] = new_x[i]
             g[i] = new_g[i]
-        for p in range(stored):
+        for p in range(written):
             sp, yp = work.steps[p, start:end], work.changes[p, start:end]
             sg = yg = sy = ys = yy = 0.0
             for i in range(end - start):
@@ -198,7 +212,7 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(state, work.gradient, network, walls, delta, contact, work.scratch)
     used = 1
-    stored = 0
+    stored = written = 0
     newest = -1
     memory = work.sg.size
     looked, energy_then, calm = used, energy + walled, False
@@ -206,7 +220,7 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
         if used - looked >= WINDOW:
             calm = energy_then - energy - walled <= settled * (energy + walled)
             looked, energy_then = used, energy + walled
-        small = _largest(work.gradient) <= tolerance
+        small = _left_kernel(state, work.gradient, lever) <= tolerance
         if (small and calm) if thorough else (small or calm):
             break
         slope = _direction_kernel(work, stored, newest)
@@ -226,16 +240,17 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
             stored = 0
             continue
         if stored == 0:
-            newest = -1
+            newest, written = -1, 0
         slot = (newest + 1) % memory
-        _remember_kernel(state, work, slot, min(memory, max(stored, slot + 1)))
+        written = max(written, slot + 1)
+        _remember_kernel(state, work, slot, written)
         energy, walled = new_energy, new_walled
         if work.sy[slot, slot] > 1e-10 * work.yy[slot, slot]:
             newest = slot
             stored = min(stored + 1, memory)
         else:
             stored = min(stored, memory - 1)  # the pair that stood in this slot is gone
-    return energy, walled, _largest(work.gradient), used
+    return energy, walled, _left_kernel(state, work.gradient, lever), used
 
 
 def orientation_lever(delta: float) -> float:
@@ -271,11 +286,11 @@ def minimise(
         The state is left, though not converged, when `WINDOW` evaluations lower the energy by no
         more than this part.
     thorough : bool
-        Leave it only when both tolerance and `settled` are met.
+        Leave it only when both are met, or no step lowers the energy any more.
     contact : float
         Stiffness of contacts (kappa0), as in `objective`.
     limit : int
-        Evaluations of the objective at most.
+        Evaluations of the objective, after which no further step is taken.
 
     Raises
     ------
@@ -304,6 +319,5 @@ def minimise(
         state, network, walls, delta, contact, lever, tolerance * lever, settled, thorough, limit, work
     )
     finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
-    return Minimum(
-        unit_orientations(state), energy, walled, gradient, used, finite and gradient <= tolerance * lever
-    )
+    converged = finite and gradient <= tolerance * lever
+    return Minimum(unit_orientations(state), energy, walled, gradient, used, converged, contact)

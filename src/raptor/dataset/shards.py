@@ -21,8 +21,6 @@ from raptor.parameters import CellParameters, NetworkModel
 
 log = logging.getLogger("raptor")
 
-ATTEMPTS = 2  # of a simulation that fails
-
 PARAMETERS = {
     "delta": "strength of the cell-matrix interaction",
     "kappa_nnn": "spring constant of the second kind of bond, in kappa0",
@@ -30,9 +28,11 @@ PARAMETERS = {
 }
 RESULTS = {
     "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
-    "wall_energy": "energy of walls and contacts, in kappa0 l0^2",
-    "gradient": "largest gradient left, by position or by orientation over delta, in kappa0 l0",
-    "converged": "1 where the gradient fell below the solver's tolerance times delta",
+    "wall_energy": "energy of the walls, in kappa0 l0^2",
+    "contact_energy": "energy of the contacts that keep bonds from reversing, in kappa0 l0^2",
+    "gradient": "largest gradient left, contacts included, by position or by orientation over delta "
+    "(at least 0.02), in kappa0 l0",
+    "converged": "1 where the gradient fell below the solver's tolerance times delta (at least 0.02)",
     "folded_fraction": "share of bonds whose direction reversed since casting",
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",
@@ -91,8 +91,9 @@ def simulate_shard(
 ) -> tuple[dict[int, Simulation], dict[int, str]]:
     """Simulate runs one after another; returns simulations and reasons of failure, by id.
 
-    A run that fails is tried once more and then given up; the others go on. `done` is told of
-    each run its simulation or the reason why there is none.
+    A run that fails is given up, and the others go on: the same seed would fail again. Want of memory or
+    disk is no run's fault and is raised, for the workflow to try the whole shard again. `done` is
+    told of each run its simulation or the reason why there is none.
     """
     simulations, failures = {}, {}
     for run in runs:
@@ -107,18 +108,14 @@ def simulate_shard(
 
 def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Simulation | str:
     """The simulation of a run, or why it failed."""
-    reason = ""
-    for _ in range(ATTEMPTS):
-        try:
-            made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
-        except Exception as error:  # whatever it is, the other runs of the shard go on
-            log.exception("simulation %d failed", run.simulation)
-            reason = f"{type(error).__name__}: {error}"
-        else:
-            if np.isfinite(made.energy) and np.isfinite(made.positions).all():
-                return made
-            reason = "the solver met numbers that are not finite"
-    return reason
+    try:
+        made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
+    except (RaptorError, ArithmeticError, np.linalg.LinAlgError) as error:
+        log.exception("simulation %d failed", run.simulation)
+        return f"{type(error).__name__}: {error}"
+    if not (np.isfinite(made.energy) and np.isfinite(made.positions).all()):
+        return "the solver met numbers that are not finite"
+    return made
 
 
 def write_shard(

@@ -80,3 +80,17 @@ def bonds(sites, shells):
                 if abs(distance - wanted) < 1e-6:
                     found.add((i, j, shell))
     return found
+
+
+def lbfgs_direction(pairs, gradient):
+    """Nocedal and Wright, algorithm 7.4, for pairs (s, y), the newest last."""
+    q, alphas = gradient.copy(), []
+    for s, y in reversed(pairs):
+        alphas.append(s @ q / (s @ y))
+        q -= alphas[-1] * y
+    if pairs:
+        s, y = pairs[-1]
+        q *= (s @ y) / (y @ y)
+    for (s, y), alpha in zip(pairs, reversed(alphas), strict=True):
+        q += (alpha - y @ q / (s @ y)) * s
+    return -q

@@ -50,7 +50,8 @@ class _Work(NamedTuple):
     """Arrays that one minimisation works in.
 
     Of pair p of the memory: `steps[p]` s_p and `changes[p]` y_p of state and gradient; `sy[p, q]`
-    s_p.y_q, `yy[p, q]` y_p.y_q, `sg[p]` s_p.g and `yg[p]` y_p.g.
+    s_p.y_q, `yy[p, q]` y_p.y_q, `sg[p]` s_p.g and `yg[p]` y_p.g. `held` is the number of pairs held,
+    the newest pair, and the number of pairs ever written since none was held.
     """
 
     gradient: NDArray[Any]
@@ -63,6 +64,7 @@ class _Work(NamedTuple):
     yy: NDArray[np.float64]
     sg: NDArray[np.float64]
     yg: NDArray[np.float64]
+    held: NDArray[np.int64]
     scratch: Scratch
 
 
@@ -142,9 +144,28 @@ def _remember_kernel(state, work, slot, written):
 
 
 @kernel
-def _direction_kernel(work, stored, newest):
+def _keep_kernel(state, work):
+    """Go to the trial state; hold the step that led there, unless it shows no curvature."""
+    memory = work.sg.size
+    stored, newest, written = work.held
+    if stored == 0:
+        newest, written = -1, 0
+    slot = (newest + 1) % memory
+    written = max(written, slot + 1)
+    _remember_kernel(state, work, slot, written)
+    if work.sy[slot, slot] > 1e-10 * work.yy[slot, slot]:
+        newest = slot
+        stored = min(stored + 1, memory)
+    else:
+        stored = min(stored, memory - 1)  # the pair that stood in this slot is gone
+    work.held[0], work.held[1], work.held[2] = stored, newest, written
+
+
+@kernel
+def _direction_kernel(work):
     """Two-loop recursion: direction = - (inverse Hessian) gradient; returns its slope."""
     memory = work.sg.size
+    stored, newest = work.held[0], work.held[1]
     on_s, on_y = np.zeros(memory), np.zeros(memory)
     alpha = np.zeros(memory)
     scale = 1.0
@@ -212,9 +233,7 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
     energy, walled = _objective_kernel(state, work.gradient, network, walls, delta, contact, work.scratch)
     used = 1
-    stored = written = 0
-    newest = -1
-    memory = work.sg.size
+    work.held[0] = 0
     looked, energy_then, calm = used, energy + walled, False
     while used < limit:
         if used - looked >= WINDOW:
@@ -223,34 +242,43 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
         small = _left_kernel(state, work.gradient, lever) <= tolerance
         if (small and calm) if thorough else (small or calm):
             break
-        slope = _direction_kernel(work, stored, newest)
+        slope = _direction_kernel(work)
         if slope >= 0.0:
-            stored = 0
-            slope = _direction_kernel(work, stored, newest)
+            work.held[0] = 0
+            slope = _direction_kernel(work)
         length = min(1.0, _longest_step(work.direction, lever))
-        if stored == 0:
+        if work.held[0] == 0:
             length = min(length, 0.1 * _longest_step(work.direction, lever))
         length, new_energy, new_walled, trials = _search_kernel(
             state, energy + walled, slope, length, network, walls, delta, contact, work
         )
         used += trials
         if length == 0.0:
-            if stored == 0:
+            if work.held[0] == 0:
                 break  # as low as rounding allows
-            stored = 0
+            work.held[0] = 0
             continue
-        if stored == 0:
-            newest, written = -1, 0
-        slot = (newest + 1) % memory
-        written = max(written, slot + 1)
-        _remember_kernel(state, work, slot, written)
+        _keep_kernel(state, work)
         energy, walled = new_energy, new_walled
-        if work.sy[slot, slot] > 1e-10 * work.yy[slot, slot]:
-            newest = slot
-            stored = min(stored + 1, memory)
-        else:
-            stored = min(stored, memory - 1)  # the pair that stood in this slot is gone
     return energy, walled, _left_kernel(state, work.gradient, lever), used
+
+
+def _workplace(state: NDArray[Any]) -> _Work:
+    """Arrays to minimise a state in."""
+    return _Work(
+        gradient=np.zeros_like(state),
+        trial=np.empty_like(state),
+        trial_gradient=np.empty_like(state),
+        direction=np.empty_like(state),
+        steps=np.zeros((MEMORY, state.size), np.float32),
+        changes=np.zeros((MEMORY, state.size), np.float32),
+        sy=np.zeros((MEMORY, MEMORY)),
+        yy=np.zeros((MEMORY, MEMORY)),
+        sg=np.zeros(MEMORY),
+        yg=np.zeros(MEMORY),
+        held=np.zeros(3, np.int64),
+        scratch=scratch(state.size // 6, state.dtype),
+    )
 
 
 def orientation_lever(delta: float) -> float:
@@ -302,19 +330,7 @@ def minimise(
     state = unit_orientations(state)
     lever = orientation_lever(delta)
     state[state.size // 2 :] *= lever
-    work = _Work(
-        gradient=np.empty_like(state),
-        trial=np.empty_like(state),
-        trial_gradient=np.empty_like(state),
-        direction=np.empty_like(state),
-        steps=np.zeros((MEMORY, state.size), np.float32),
-        changes=np.zeros((MEMORY, state.size), np.float32),
-        sy=np.zeros((MEMORY, MEMORY)),
-        yy=np.zeros((MEMORY, MEMORY)),
-        sg=np.zeros(MEMORY),
-        yg=np.zeros(MEMORY),
-        scratch=scratch(state.size // 6, state.dtype),
-    )
+    work = _workplace(state)
     energy, walled, gradient, used = _minimise_kernel(
         state, network, walls, delta, contact, lever, tolerance * lever, settled, thorough, limit, work
     )

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import torch
+
 from raptor.files import atomic_path
 from raptor.jobs import logged, progress
 from raptor.moulds import read_mould
@@ -9,6 +11,7 @@ from raptor.surrogate.inference import load
 from raptor.tradeoff import Case, Comparison, compare
 
 with logged(snakemake.log[0]):
+    torch.set_num_threads(snakemake.threads)
     params = snakemake.params.comparison
     chosen = params["comparison"]
     case = Case.of(params, read_mould(Path(snakemake.input.mould)))

@@ -5,7 +5,7 @@ from pathlib import Path
 from raptor.dataset.design import read_design
 from raptor.dataset.stack import build_stack
 from raptor.jobs import logged, progress
-from raptor.moulds import read_moulds
+from raptor.moulds import moulds_by_id
 
 with logged(snakemake.log[0]):
     runs = read_design(Path(snakemake.input.design))
@@ -14,7 +14,7 @@ with logged(snakemake.log[0]):
             Path(snakemake.output.stack),
             [Path(shard) for shard in snakemake.input.shards],
             runs,
-            {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))},
+            moulds_by_id(Path(snakemake.input.moulds)),
             snakemake.params.pixels,
             simulation_configuration=snakemake.params.simulation_configuration,
             configuration=snakemake.params.configuration,

@@ -10,13 +10,13 @@ from raptor.dataset.stack import read_table
 from raptor.evaluation import evaluate, summarise, training_mean
 from raptor.files import atomic_path
 from raptor.jobs import logged, progress
-from raptor.moulds import read_moulds
+from raptor.moulds import moulds_by_id
 from raptor.surrogate.inference import load
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     stack = Path(snakemake.input.stack)
-    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
+    moulds = moulds_by_id(Path(snakemake.input.moulds))
     mean = training_mean(stack, read_examples(Path(snakemake.input.examples)))
     surrogate = load(Path(snakemake.input.weights).parent)
     with progress("evaluation", len(read_table(stack).rows("test"))) as done:

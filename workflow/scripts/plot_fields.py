@@ -6,7 +6,7 @@ import pandas as pd
 
 from raptor.dataset.stack import read_samples, read_table
 from raptor.jobs import logged
-from raptor.moulds import read_moulds
+from raptor.moulds import moulds_by_id
 from raptor.plotting import fields_figure, save, save_fields
 from raptor.surrogate.inference import load
 
@@ -16,7 +16,7 @@ with logged(snakemake.log[0]):
     stack = Path(snakemake.input.stack)
     row = read_table(stack).simulation.tolist().index(simulation)
     (sample,) = read_samples(stack, [row])
-    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
+    moulds = moulds_by_id(Path(snakemake.input.moulds))
     surrogate = load(Path(snakemake.input.weights).parent)
     predicted = surrogate.predict(sample.depression, sample.tethers, [sample.parameters])[0]
     figure = fields_figure(sample.fields, predicted, moulds[sample.mould])

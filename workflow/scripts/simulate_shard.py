@@ -5,13 +5,13 @@ from pathlib import Path
 from raptor.dataset.design import read_design
 from raptor.dataset.shards import simulate_shard, write_shard
 from raptor.jobs import logged, progress
-from raptor.moulds import read_moulds
+from raptor.moulds import moulds_by_id
 from raptor.parameters import NetworkModel
 
 with logged(snakemake.log[0]):
     first, last = (int(number) for number in snakemake.wildcards.shard.split("-"))
     runs = [run for run in read_design(Path(snakemake.input.design)) if first <= run.simulation <= last]
-    moulds = {mould.name: mould for mould in read_moulds(Path(snakemake.input.moulds))}
+    moulds = moulds_by_id(Path(snakemake.input.moulds), {run.mould for run in runs})
     params = snakemake.params
     model = NetworkModel(params.layers, tuple(params.shells), params.tension)
     with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:

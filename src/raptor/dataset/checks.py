@@ -22,7 +22,7 @@ from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
 from raptor.errors import RaptorError
 from raptor.fields import SIGMA
-from raptor.moulds.geojson import read_moulds
+from raptor.moulds.geojson import moulds_by_id, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image, pixel_size
 from raptor.symmetry import FIELDS
@@ -82,7 +82,7 @@ def _check_folder(folder: Path, part: float) -> Iterator[str]:
     if not stack.is_file():
         raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder or a file")
     runs = read_design(folder / "design" / "design.csv")
-    moulds = {mould.name: mould for mould in read_moulds(folder / "design" / "moulds.geojson")}
+    moulds = moulds_by_id(folder / "design" / "moulds.geojson")
     yield from check_design(runs, moulds)
     yield from check_stack(stack)
     with open_file(stack) as file:

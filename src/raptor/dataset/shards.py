@@ -91,13 +91,15 @@ def simulate_shard(
 ) -> tuple[dict[int, Simulation], dict[int, str]]:
     """Simulate runs one after another; returns simulations and reasons of failure, by id.
 
-    A run that fails is given up, and the others go on: the same seed would fail again. Want of memory or
-    disk is no run's fault and is raised, for the workflow to try the whole shard again. `done` is
-    told of each run its simulation or the reason why there is none.
+    A run that fails is tried once more, then given up, and the others go on. Want of memory or disk is
+    no run's fault and is raised, for the workflow to try the whole shard again. `done` is told of each
+    run its simulation or the reason why there is none.
     """
     simulations, failures = {}, {}
     for run in runs:
         outcome = _simulate(run, moulds, model, accuracy)
+        if isinstance(outcome, str):
+            outcome = _simulate(run, moulds, model, accuracy)
         if isinstance(outcome, str):
             failures[run.simulation] = outcome
         else:

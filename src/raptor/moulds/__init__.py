@@ -1,6 +1,6 @@
 """Moulds: geometry, file format, random generator, the paper's standard moulds."""
 
-from raptor.moulds.geojson import read_mould, read_moulds, write_moulds
+from raptor.moulds.geojson import moulds_by_id, read_mould, read_moulds, write_moulds
 from raptor.moulds.geometry import IMAGE_SIZE, Circle, Mould, PolygonTether, Tether
 from raptor.moulds.raster import MouldImage, mould_image, pixel_centres
 
@@ -12,6 +12,7 @@ __all__ = [
     "PolygonTether",
     "Tether",
     "mould_image",
+    "moulds_by_id",
     "pixel_centres",
     "read_mould",
     "read_moulds",

@@ -1,7 +1,7 @@
 """Mould files: GeoJSON, one feature a mould, tethers in its properties (see docs/data.md)."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from raptor.files import atomic_path
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
 
-def read_moulds(path: Path) -> list[Mould]:
-    """Read every mould of a FeatureCollection.
+def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
+    """Read the moulds of a FeatureCollection; with `only`, those of these ids.
 
     Raises
     ------
@@ -49,9 +49,14 @@ def read_moulds(path: Path) -> list[Mould]:
     if not features:
         raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
     try:
-        return [_mould(feature, path) for feature in features]
+        return [_mould(f, path) for f in features if only is None or _name(f, path) in only]
     except (AttributeError, TypeError, KeyError, IndexError) as error:
         raise RaptorError(f"mould file {path} is not GeoJSON of a mould: {error}") from error
+
+
+def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mould]:
+    """The moulds that `read_moulds` reads, by id; raises as it does."""
+    return {mould.name: mould for mould in read_moulds(path, only)}
 
 
 def read_mould(path: Path) -> Mould:
@@ -82,9 +87,13 @@ def write_moulds(path: Path, moulds: Iterable[Mould]) -> None:
         temporary.write_text(json.dumps(collection, indent=1) + "\n", encoding="utf-8")
 
 
+def _name(feature: dict[str, Any], path: Path) -> str:
+    return str((feature.get("properties") or {}).get("mould", path.stem))
+
+
 def _mould(feature: dict[str, Any], path: Path) -> Mould:
     properties = feature.get("properties") or {}
-    name = str(properties.get("mould", path.stem))
+    name = _name(feature, path)
     where = f"mould file {path}, {name}"
     geometry = feature.get("geometry") or {}
     if geometry.get("type") == "MultiPolygon":

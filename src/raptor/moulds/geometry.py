@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ IMAGE_SIZE = 62.5
 
 SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
 STRICTLY = 1e-9  # a site this close to a wall does not hold a cell
+TOUCHING = 1e-3  # l0; how far a tether may reach out of the outline
+TOO_THIN = f"is too thin to hold cells back; make it at least {2 * SMALLEST_TETHER} l0 across"
 CIRCLE_SEGMENTS = 64  # a quarter circle, where a circle must be drawn as a polygon
 
 
@@ -31,6 +34,24 @@ class Circle:
     def polygon(self) -> shapely.Polygon:
         """The post as a polygon, for drawing and for relations between shapes."""
         return shapely.Point(self.x, self.y).buffer(self.radius, quad_segs=CIRCLE_SEGMENTS)
+
+    @property
+    def area(self) -> float:
+        """Area of the post, l0^2."""
+        return pi * self.radius**2
+
+    def validate(self, what: str) -> None:
+        """Raise a RaptorError, which calls the post `what`, unless it holds cells back."""
+        if not self.radius > 0:
+            raise RaptorError(f"{what} has radius {self.radius}; it must be positive")
+        if self.radius < 0.999 * SMALLEST_TETHER:
+            raise RaptorError(f"{what} {TOO_THIN}")
+
+    def stands_in(self, outline: shapely.Polygon) -> bool:
+        """Whether it lies in the outline, touching allowed."""
+        centre = shapely.Point(self.x, self.y)
+        reach: float = outline.exterior.distance(centre)
+        return bool(outline.contains(centre) and reach >= self.radius - TOUCHING)
 
     def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Signed depth of points (n, 2) inside the post, (n,), l0; negative outside."""
@@ -55,6 +76,21 @@ class PolygonTether:
     """A tether of any simple outline, such as a bar."""
 
     polygon: shapely.Polygon
+
+    @property
+    def area(self) -> float:
+        """Area of the tether, l0^2."""
+        return float(self.polygon.area)
+
+    def validate(self, what: str) -> None:
+        """Raise a RaptorError, which calls the tether `what`, unless it is simple and holds cells back."""
+        _validate_polygon(self.polygon, what)
+        if self.polygon.buffer(-0.999 * SMALLEST_TETHER).is_empty:
+            raise RaptorError(f"{what} {TOO_THIN}")
+
+    def stands_in(self, outline: shapely.Polygon) -> bool:
+        """Whether it lies in the outline, touching allowed."""
+        return bool(outline.covers(self.polygon.buffer(-TOUCHING)))
 
     def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Signed depth of points (n, 2) inside the tether, (n,), l0; negative outside."""
@@ -116,16 +152,12 @@ class Mould:
             )
         for number, tether in enumerate(self.tethers, start=1):
             what = f"{self.name}: tether {number}"
-            if isinstance(tether, Circle) and not tether.radius > 0:
-                raise RaptorError(f"{what} has radius {tether.radius}; it must be positive")
-            _validate_polygon(tether.polygon, what)
-            if tether.polygon.buffer(-0.999 * SMALLEST_TETHER).is_empty:
-                raise RaptorError(
-                    f"{what} is too thin to hold cells back; make it at least {2 * SMALLEST_TETHER} l0 across"
-                )
-            if not self.outline.covers(tether.polygon.buffer(-1e-3)):
+            tether.validate(what)
+            if not tether.stands_in(self.outline):
                 raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
-        if self.depression.area < 1e-6:
+        # Most moulds have room left whatever their tethers overlap; the union is dear.
+        room = self.outline.area - sum(tether.area for tether in self.tethers)
+        if room < 1e-6 and self.depression.area < 1e-6:
             raise RaptorError(f"{self.name}: the tethers cover the depression; nothing is left to cast")
 
     @cached_property

@@ -98,7 +98,7 @@ def simulate_shard(
     simulations, failures = {}, {}
     for run in runs:
         outcome = _simulate(run, moulds, model, accuracy)
-        if isinstance(outcome, str):
+        if isinstance(outcome, str):  # once more: not every cause of a failure stays
             outcome = _simulate(run, moulds, model, accuracy)
         if isinstance(outcome, str):
             failures[run.simulation] = outcome

@@ -1,5 +1,7 @@
 """A data set small enough to be made in seconds, without the workflow; real in every part."""
 
+from pathlib import Path
+
 from raptor.configuration import Configuration
 from raptor.dataset.design import sample_design, write_design
 from raptor.dataset.examples import augment, training_scaling, write_examples
@@ -7,6 +9,9 @@ from raptor.dataset.scaling import write_scaling
 from raptor.dataset.shards import simulate_shard, write_shard
 from raptor.dataset.stack import build_stack
 from raptor.moulds import write_moulds
+
+ROOT = Path(__file__).parents[1]
+MINI = ROOT / "tests" / "data" / "mini"  # a data set that the workflow made: docs/tutorial.md
 
 CONFIG = Configuration.model_validate(
     {

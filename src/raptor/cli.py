@@ -1,10 +1,11 @@
-"""The command line: raptor simulate | predict | check | same | reference."""
+"""The command line: raptor simulate | predict | check | trace | same | progress | well | reference."""
 
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+import yaml
 
 from raptor.errors import RaptorError
 
@@ -130,6 +131,25 @@ def check(
         typer.echo(fault)
     typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")
     raise typer.Exit(1 if faults else 0)
+
+
+@app.command()
+def trace(
+    folder: Annotated[Path, typer.Argument(help="results folder")],
+    simulation: Annotated[int | None, typer.Option(help="simulation id")] = None,
+    example: Annotated[int | None, typer.Option(help="row of dataset/examples.csv, from 0")] = None,
+) -> None:
+    """Tell where a sample comes from: mould, parameters, seed, solver, package and model version."""
+    from raptor.dataset.provenance import trace_example, trace_simulation
+
+    if (simulation is None) == (example is None):
+        raise RaptorError("give one of --simulation and --example")
+    if simulation is not None:
+        found = trace_simulation(folder, simulation)
+    else:
+        assert example is not None
+        found = trace_example(folder, example)
+    typer.echo(yaml.safe_dump(found, sort_keys=False).rstrip())
 
 
 @app.command()

@@ -34,7 +34,10 @@ rule simulate_shard:
     retries: 2
     threads: 1
     resources:
-        mem_mb=lambda wildcards, attempt: 1000 * attempt,
+        mem_mb=lambda wildcards, attempt: (400 + 4 * CONFIG.simulation.shard_size)
+        * attempt,
+        runtime=lambda wildcards, attempt: (10 + 2 * CONFIG.simulation.shard_size)
+        * attempt,
     params:
         configuration=CONFIG.fingerprint("simulation"),
         layers=CONFIG.model.layers,

@@ -24,6 +24,7 @@ rule train_surrogate:
     threads: CONFIG.surrogate.threads
     resources:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=lambda wildcards, attempt: 720 * attempt,
     params:
         identity=CONFIG.fingerprint("surrogate"),
         surrogate=CONFIG.surrogate.model_dump(mode="json"),

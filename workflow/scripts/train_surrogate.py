@@ -21,6 +21,7 @@ with logged(snakemake.log[0]):
         **{name: given[name] for name in names},
         seed=snakemake.params.seed % 2**63,
         threads=snakemake.threads,
+        workers=given["workers"],
     )
     # A checkpoint goes on only if configuration and data are those that it was made from.
     files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]

@@ -1,5 +1,6 @@
 """Examples for torch: read lazily from the stack, transformed and scaled."""
 
+import os
 from pathlib import Path
 
 import h5py
@@ -9,35 +10,45 @@ from torch.utils.data import Dataset
 
 from raptor.dataset.examples import Example
 from raptor.dataset.scaling import Scaling, scale_inputs
-from raptor.dataset.shards import PARAMETERS
-from raptor.parameters import CellParameters
+from raptor.dataset.stack import read_table
 from raptor.symmetry import Element, apply, move_pixels
 
 
 class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
     """Pairs of inputs (5, y, x) and targets (8, y, x), both scaled, float32.
 
-    The stack is opened on first use, once in each worker process, and read one sample at a time.
+    The stack is opened on first use, by each process that reads for itself, and read one sample at a
+    time: what is in memory does not grow with the stack.
+
+    Raises
+    ------
+    RaptorError
+        Where the stack cannot be read.
     """
 
     def __init__(self, stack: Path, examples: list[Example], scaling: Scaling) -> None:
         self.stack = Path(stack)
         self.examples = examples
         self.scaling = scaling
+        self.parameters = read_table(stack).parameters
         self._file: h5py.File | None = None
+        self._reader = 0
 
     def __len__(self) -> int:
         return len(self.examples)
 
+    def _open(self) -> h5py.File:
+        """The stack, opened by this process: HDF5 must not share a file with a parent that forked."""
+        if self._file is None or self._reader != os.getpid():
+            self._file, self._reader = h5py.File(self.stack, "r"), os.getpid()
+        return self._file
+
     def __getitem__(self, number: int) -> tuple[Tensor, Tensor]:
-        if self._file is None:
-            self._file = h5py.File(self.stack, "r")
-        file, example = self._file, self.examples[number]
+        file, example = self._open(), self.examples[number]
         element = Element.from_index(example.element)
-        parameters = CellParameters(*(float(file[name][example.sample]) for name in PARAMETERS))
         depression, tethers = (
             move_pixels(file[name][example.sample], element) for name in ("depression", "tethers")
         )
-        inputs = scale_inputs(depression, tethers, parameters)
+        inputs = scale_inputs(depression, tethers, self.parameters[example.sample])
         target = self.scaling.forward(apply(file["fields"][example.sample], element))
         return torch.from_numpy(inputs), torch.from_numpy(target)

@@ -133,11 +133,7 @@ def write_shard(
     failures = failures or {}
     with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
         file.featureType = "point"
-        file.shells = np.array(model.shells, dtype=np.int32)
-        file.layers = np.int32(model.layers)
-        file.tension = model.tension
-        file.accuracy = accuracy
-        file.solver = accuracy_named(accuracy).solver
+        write_model(file, model, accuracy)
         made = [run for run in runs if run.simulation in simulations]
         ordered = [simulations[run.simulation] for run in made]
         file.createDimension("simulation", len(made))
@@ -152,6 +148,15 @@ def write_shard(
             ids = np.array(list(failures), dtype=np.int32)
             variable(file, "failed_simulation", ("failure",), ids, "simulation that failed")
             variable(file, "failure_reason", ("failure",), list(failures.values()), "why it failed")
+
+
+def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str) -> None:
+    """State as attributes what anyone needs to compute the simulations again."""
+    file.shells = np.array(model.shells, dtype=np.int32)
+    file.layers = np.int32(model.layers)
+    file.tension = model.tension
+    file.accuracy = accuracy
+    file.solver = accuracy_named(accuracy).solver
 
 
 def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]) -> None:

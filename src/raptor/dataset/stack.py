@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard
+from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard, write_model
 from raptor.errors import RaptorError
 from raptor.fields import rasterise
 from raptor.moulds.geometry import Mould
@@ -37,6 +37,7 @@ class Sample:
     tethers: NDArray[np.uint8]
     parameters: CellParameters
     simulation: int
+    seed: int
     mould: str
     split: str
     n_cells: int
@@ -79,7 +80,9 @@ def build_stack(
         file.shards = " ".join(Path(shard).name for shard in shards)
         file.missing = " ".join(str(simulation) for simulation in sorted(failed))
         for shard_path in shards:
-            for record in read_shard(shard_path, simulation_configuration).records:
+            shard = read_shard(shard_path, simulation_configuration)
+            write_model(file, shard.model, shard.accuracy)  # the same of all: they share a configuration
+            for record in shard.records:
                 if record.simulation not in left:
                     raise RaptorError(
                         f"shard {shard_path} holds simulation {record.simulation}, which the design "
@@ -97,6 +100,7 @@ def build_stack(
                         image.tethers.astype(np.uint8),
                         run.parameters,
                         run.simulation,
+                        run.seed,
                         run.mould,
                         run.split,
                         len(record.positions),
@@ -138,6 +142,7 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         "tethers": ("u1", ("sample", "y", "x"), "1 where a tether stands", {"chunksizes": plane} | packed),
         **{name: ("f8", along, text, {}) for name, text in PARAMETERS.items()},
         "simulation": ("i4", along, "simulation id", {}),
+        "seed": ("i8", along, "seed of the simulation's random stream", {}),
         "mould": (str, along, "mould id", {}),
         "split": (str, along, "train, validation or test", {}),
         "n_cells": ("i4", along, "number of cells", {}),
@@ -148,19 +153,8 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         made.long_name, made.units = long_name, "1"
 
     def write(row: int, sample: Sample) -> None:
-        for name in (
-            "fields",
-            "depression",
-            "tethers",
-            "simulation",
-            "mould",
-            "split",
-            "n_cells",
-            "converged",
-        ):
-            file[name][row] = getattr(sample, name)
-        for name in PARAMETERS:
-            file[name][row] = getattr(sample.parameters, name)
+        for name in columns:
+            file[name][row] = getattr(sample.parameters if name in PARAMETERS else sample, name)
 
     return write
 
@@ -214,6 +208,7 @@ def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
                 file["tethers"][row],
                 CellParameters(*(float(file[name][row]) for name in PARAMETERS)),
                 int(file["simulation"][row]),
+                int(file["seed"][row]),
                 str(file["mould"][row]),
                 str(file["split"][row]),
                 int(file["n_cells"][row]),

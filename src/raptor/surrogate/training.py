@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from torch.utils.data import DataLoader
 
 from raptor.dataset.examples import Example
 from raptor.dataset.loader import ExampleSet
-from raptor.dataset.scaling import Scaling
+from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
 from raptor.surrogate.losses import discriminator_loss, generator_loss
@@ -46,6 +46,8 @@ class TrainingRules:
         Of first weights, order of examples and dropout.
     threads : int
         Processor threads; trained weights are equal for an equal number.
+    workers : int
+        Processes that read examples ahead; weights do not depend on them.
     """
 
     epochs: int
@@ -55,6 +57,7 @@ class TrainingRules:
     lambda_l1: float
     seed: int
     threads: int
+    workers: int = 0
 
 
 @dataclass
@@ -133,7 +136,8 @@ def train(
     for epoch in range(len(state.history), rules.epochs):
         started = time.perf_counter()
         losses = _train_epoch(state, chosen["train"], rules, epoch, device)
-        error = validation_error(state.generator, chosen["validation"], rules.batch_size, device)
+        batches = DataLoader(chosen["validation"], rules.batch_size, num_workers=rules.workers)
+        error = validation_error(state.generator, batches, device)
         row = {"epoch": epoch, **losses, "validation_error": error}
         row["seconds"] = time.perf_counter() - started
         if not np.isfinite(list(row.values())).all():
@@ -192,7 +196,7 @@ def _train_epoch(
     state.discriminator.train()
     sums = {"generator_loss": 0.0, "l1": 0.0, "discriminator_loss": 0.0}
     batches = 0
-    for inputs, target in DataLoader(dataset, rules.batch_size, sampler=order):
+    for inputs, target in DataLoader(dataset, rules.batch_size, sampler=order, num_workers=rules.workers):
         losses = _step(state, inputs.to(device), target.to(device), rules.lambda_l1)
         sums = {key: value + losses[key] for key, value in sums.items()}
         batches += 1
@@ -223,7 +227,7 @@ def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> di
 
 
 def validation_error(
-    generator: Generator, dataset: ExampleSet, batch_size: int, device: torch.device
+    generator: Generator, batches: Iterable[tuple[Tensor, Tensor]], device: torch.device
 ) -> float:
     """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
 
@@ -233,12 +237,27 @@ def validation_error(
     generator.eval()
     error, variance = np.zeros(len(SCORED)), np.zeros(len(SCORED))
     with torch.no_grad():
-        for inputs, target in DataLoader(dataset, batch_size):
+        for inputs, target in batches:
             predicted = generator(inputs.to(device))[:, SCORED].cpu()
             wanted = target[:, SCORED]
             error += ((predicted - wanted) ** 2).mean(dim=(2, 3), dtype=torch.float64).sum(dim=0).numpy()
             variance += wanted.double().var(dim=(2, 3), correction=0).sum(dim=0).numpy()
     return float(np.sqrt(error / np.maximum(variance, 1e-12)).mean())
+
+
+def samples_a_second(architecture: Architecture, rules: TrainingRules, steps: int = 3) -> float:
+    """Examples a second that steps of training take, reading left out; for benchmarks."""
+    torch.set_num_threads(rules.threads)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    state = _start(architecture, rules, device)
+    shape = (rules.batch_size, architecture.pixels, architecture.pixels)
+    inputs = torch.randn(shape[0], len(INPUTS), *shape[1:], device=device)
+    target = torch.randn(shape[0], len(FIELDS), *shape[1:], device=device)
+    _step(state, inputs, target, rules.lambda_l1)  # the first one also plans
+    started = time.perf_counter()
+    for _ in range(steps):
+        _step(state, inputs, target, rules.lambda_l1)  # ends with its losses on the processor
+    return steps * rules.batch_size / (time.perf_counter() - started)
 
 
 def write_history(path: Path, history: pd.DataFrame) -> None:

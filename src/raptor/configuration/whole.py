@@ -1,0 +1,123 @@
+"""The whole configuration: one model from which defaults, JSON schema and key table are made."""
+
+import hashlib
+import json
+from typing import Any
+
+from pydantic import Field, model_validator
+
+from raptor import MODEL_VERSION
+from raptor.configuration.blocks import (
+    Block,
+    Dataset,
+    Design,
+    Fields,
+    Fit,
+    Model,
+    Moulds,
+    Name,
+    Simulation,
+    Surrogate,
+)
+from raptor.configuration.tradeoff import Tradeoff, TradeoffCase
+from raptor.dataset.design import DesignRules
+from raptor.moulds.geometry import IMAGE_SIZE
+from raptor.moulds.random_moulds import RandomMoulds
+from raptor.parameters import Bounds, NetworkModel
+
+
+class Configuration(Block):
+    """A data set factory's run, from moulds to fitted tissues."""
+
+    name: Name = Field("laptop", description="folder of the results, under results/")
+    seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
+    design: Design = Field(default_factory=lambda: Design())
+    moulds: Moulds = Field(default_factory=lambda: Moulds())
+    model: Model = Field(default_factory=lambda: Model())
+    simulation: Simulation = Field(default_factory=lambda: Simulation())
+    fields: Fields = Field(default_factory=lambda: Fields())
+    dataset: Dataset = Field(default_factory=lambda: Dataset())
+    surrogate: Surrogate = Field(default_factory=lambda: Surrogate())
+    fit: Fit = Field(default_factory=lambda: Fit())
+    tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Configuration":
+        side = IMAGE_SIZE - 2 * self.moulds.margin
+        if self.moulds.cells[1] > 0.9 * side**2 * self.model.layers:
+            raise ValueError(
+                f"moulds.cells allows {self.moulds.cells[1]} cells, more than {self.model.layers} "
+                f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise model.layers"
+            )
+        for pixels in self.tradeoff.pixels:
+            if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
+                raise ValueError(
+                    f"tradeoff.pixels has {pixels}, no whole part or multiple of fields.pixels "
+                    f"({self.fields.pixels}); choose one that is"
+                )
+        return self
+
+    @property
+    def shards(self) -> list[str]:
+        """Names of the shards: the first and the last simulation of each."""
+        size, last = self.simulation.shard_size, self.design.simulations - 1
+        return [f"{i:05d}-{min(i + size - 1, last):05d}" for i in range(0, last + 1, size)]
+
+    def network_model(self) -> NetworkModel:
+        """The model of the simulations."""
+        return NetworkModel(self.model.layers, self.model.shells, self.model.tension)
+
+    def comparison(self, case: TradeoffCase) -> dict[str, Any]:
+        """All that the comparison on one case hangs on, for the rule that makes it."""
+        model = self.model.model_dump(mode="json")
+        model["layers"] = self.model.layers if case.layers is None else case.layers
+        shared = self.tradeoff.model_dump(
+            mode="json", include={"methods", "layers", "shells", "pixels", "seeds"}
+        )
+        shared["methods"] = list(dict.fromkeys([*shared["methods"], *case.methods]))
+        alike = case.layers in (None, self.model.layers)
+        return {
+            "case": case.model_dump(mode="json", exclude={"methods"}),
+            "model": model,
+            "pixels": self.fields.pixels,
+            "seed": self.seed,
+            "comparison": shared,
+            "surrogate": self.tradeoff.surrogate and alike,
+        }
+
+    def random_moulds(self) -> RandomMoulds:
+        """What moulds are drawn from."""
+        m = self.moulds
+        symmetry: dict[str, float] = {str(k): v for k, v in m.symmetry.items()}
+        return RandomMoulds(
+            m.cells, self.model.layers, m.tethers, m.tether_radius, m.arm_width, m.margin, symmetry
+        )
+
+    def design_rules(self) -> DesignRules:
+        """What the design is drawn from."""
+        d = self.design
+        ranges = (Bounds(*d.delta), Bounds(*d.kappa_nnn), Bounds(*d.kappa_nnnn))
+        return DesignRules(d.simulations, d.test, d.validation, d.edge, *ranges)
+
+    def fingerprint(self, stage: str) -> str:
+        """Hash of the configuration that a stage's files depend on, model version included."""
+        return content_hash(self._depends(stage))
+
+    def _depends(self, stage: str) -> Any:
+        dump = self.model_dump(mode="json")
+        design = [self.seed, dump["design"], dump["moulds"], self.model.layers, MODEL_VERSION]
+        simulation = [design, dump["model"], self.simulation.accuracy]
+        dataset = [simulation, dump["fields"]]
+        surrogate = [dataset, self.surrogate.model_dump(mode="json", exclude={"workers"})]
+        stages = {
+            "design": design,
+            "simulation": simulation,
+            "dataset": dataset,
+            "surrogate": surrogate,
+        }
+        return stages[stage]
+
+
+def content_hash(content: Any) -> str:
+    """Short hash of anything that JSON can hold."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,0 +1,102 @@
+"""Where a sample comes from: the way back from an image to mould, parameters, seed, solver and versions."""
+
+from pathlib import Path
+from typing import Any
+
+from raptor.dataset.design import read_design
+from raptor.dataset.examples import read_examples
+from raptor.dataset.netcdf import open_file
+from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures
+from raptor.dataset.stack import LONG_NAMES, read_table
+from raptor.errors import RaptorError
+from raptor.fields import SIGMA
+from raptor.moulds.geojson import moulds_by_id
+from raptor.moulds.raster import pixel_size
+from raptor.symmetry import Element
+
+MADE_BY = ("source", "model_version", "solver", "accuracy", "layers", "shells", "tension", "configuration")
+"""Attributes that say what made a file."""
+
+
+def trace_example(folder: Path, example: int) -> dict[str, Any]:
+    """Where a row of examples.csv comes from: its element of D4, and its simulation's trace.
+
+    Raises
+    ------
+    RaptorError
+        Where there is no such row, or a file on the way is missing.
+    """
+    examples = read_examples(folder / "dataset" / "examples.csv")
+    if not 0 <= example < len(examples):
+        raise RaptorError(f"{folder} has examples 0 to {len(examples) - 1}; example {example} is not there")
+    chosen = examples[example]
+    table = read_table(folder / "dataset" / "fields.nc")
+    matrix = Element.from_index(chosen.element).matrix
+    image = {"element": chosen.element, "matrix": matrix.astype(int).tolist()}
+    simulation = int(table.simulation[chosen.sample])
+    return {"example": example, "image under D4": image, **trace_simulation(folder, simulation)}
+
+
+def trace_simulation(folder: Path, simulation: int) -> dict[str, Any]:
+    """Where a simulation's fields come from, as plain values; files by their place in the folder.
+
+    Raises
+    ------
+    RaptorError
+        Where the design does not have the simulation, or a file on the way is missing.
+    """
+    folder = Path(folder)
+    runs = {run.simulation: run for run in read_design(folder / "design" / "design.csv")}
+    if simulation not in runs:
+        raise RaptorError(f"{folder} has simulations {min(runs)} to {max(runs)}, not {simulation}")
+    run = runs[simulation]
+    mould = moulds_by_id(folder / "design" / "moulds.geojson", {run.mould})[run.mould]
+    return {
+        "simulation": simulation,
+        "split": run.split,
+        "mould": {"id": run.mould, "file": "design/moulds.geojson", **_describe(mould.as_feature())},
+        "parameters": {name: getattr(run.parameters, name) for name in PARAMETERS},
+        "seed": run.seed,
+        **_trace_shard(folder, simulation),
+        **_trace_stack(folder, simulation),
+    }
+
+
+def _describe(feature: dict[str, Any]) -> dict[str, Any]:
+    """Sizes of a mould, without its corners."""
+    given = feature["properties"]
+    return {"symmetry": given["symmetry"], "area": given["area"], "tethers": len(given["tethers"])}
+
+
+def _trace_shard(folder: Path, simulation: int) -> dict[str, Any]:
+    """The shard that holds a simulation, what made it, and how the simulation ended."""
+    for path in sorted((folder / "simulations").glob("*.nc")):
+        place = f"simulations/{path.name}"
+        failures = read_failures(path)
+        if simulation in failures:
+            return {"shard": place, "failed": failures[simulation]}
+        with open_file(path) as file:
+            rows = [row for row, number in enumerate(file["simulation"][:]) if number == simulation]
+            if rows:
+                ended = {name: file[name][rows[0]].item() for name in (*RESULTS, "wall_time")}
+                return {"shard": place, "made by": _made_by(file), "ended with": ended}
+    raise RaptorError(f"no shard of {folder} holds simulation {simulation}; run the workflow again")
+
+
+def _trace_stack(folder: Path, simulation: int) -> dict[str, Any]:
+    """The row of the stack, and how its fields were made from cells."""
+    path = folder / "dataset" / "fields.nc"
+    rows = [row for row, number in enumerate(read_table(path).simulation) if number == simulation]
+    if not rows:
+        return {}
+    with open_file(path) as file:
+        pixels = file.dimensions["x"].size
+        raster = {"pixels": pixels, "pixel_size": pixel_size(pixels), "sigma": SIGMA}
+        made = {"file": "dataset/fields.nc", "sample": rows[0], "source": str(file.source)}
+        return {"fields": {**made, "raster": raster, "meaning": dict(LONG_NAMES)}}
+
+
+def _made_by(file: Any) -> dict[str, Any]:
+    """Attributes as plain values."""
+    found = {name: getattr(file, name) for name in MADE_BY}
+    return {name: value if isinstance(value, str) else value.tolist() for name, value in found.items()}

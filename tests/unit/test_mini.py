@@ -1,0 +1,119 @@
+"""The small data set that is kept with the code, and what tells, loads and measures data sets."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from torch.utils.data import DataLoader
+
+from raptor.condor.accuracy import simulate
+from raptor.dataset.checks import check
+from raptor.dataset.design import read_design
+from raptor.dataset.examples import read_examples
+from raptor.dataset.loader import ExampleSet
+from raptor.dataset.provenance import trace_example, trace_simulation
+from raptor.dataset.scaling import read_scaling
+from raptor.dataset.stack import read_samples
+from raptor.errors import RaptorError
+from raptor.fields import rasterise
+from raptor.moulds import moulds_by_id
+from raptor.parameters import CellParameters, NetworkModel
+from raptor.symmetry import Element, apply
+from tests.small import MINI, ROOT
+
+
+def test_it_is_sound_and_small():
+    assert check(MINI) == []
+    assert sum(path.stat().st_size for path in MINI.rglob("*")) < 3e6
+
+
+def test_a_trace_is_enough_to_make_the_fields_again():
+    """From what the trace says alone: the solver's own tolerance is the only difference."""
+    traced = trace_simulation(MINI, 5)
+    made_by = traced["made by"]
+    mould = moulds_by_id(MINI / traced["mould"]["file"], {traced["mould"]["id"]})[traced["mould"]["id"]]
+    model = NetworkModel(made_by["layers"], tuple(made_by["shells"]), made_by["tension"])
+    again = simulate(
+        mould, CellParameters(**traced["parameters"]), model, made_by["accuracy"], traced["seed"]
+    )
+    # Another processor may round otherwise and end in a neighbouring state.
+    assert again.energy == pytest.approx(traced["ended with"]["energy"], rel=0.03)
+    fields = rasterise(again.positions, again.orientation, again.tension, 64)
+    (sample,) = read_samples(MINI / "dataset" / "fields.nc", [traced["fields"]["sample"]])
+    assert sample.simulation == 5
+    assert np.corrcoef(fields[0].ravel(), sample.fields[0].ravel())[0, 1] > 0.98
+
+
+def test_an_example_is_traced_to_its_image_and_simulation():
+    chosen = read_examples(MINI / "dataset" / "examples.csv")[7]
+    traced = trace_example(MINI, 7)
+    assert traced["image under D4"]["element"] == chosen.element
+    assert traced["fields"]["sample"] == chosen.sample
+    assert "test" not in {trace_example(MINI, n)["split"] for n in (0, 40, 82)}
+
+
+def test_what_is_not_there_cannot_be_traced():
+    with pytest.raises(RaptorError, match="has simulations 0 to 23, not 24"):
+        trace_simulation(MINI, 24)
+    with pytest.raises(RaptorError, match="has examples 0 to 82; example 83 is not there"):
+        trace_example(MINI, 83)
+
+
+def test_the_command_line_traces():
+    command = [sys.executable, "-c", "from raptor.cli import main; main()", "trace", str(MINI)]
+    done = subprocess.run([*command, "--simulation", "3"], capture_output=True, text=True, check=True)
+    assert yaml.safe_load(done.stdout) == trace_simulation(MINI, 3)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "give one of --simulation and --example" in done.stderr
+
+
+def test_the_stack_states_seeds_and_model():
+    seeds = {run.simulation: run.seed for run in read_design(MINI / "design" / "design.csv")}
+    samples = read_samples(MINI / "dataset" / "fields.nc", range(24))
+    assert {sample.simulation: sample.seed for sample in samples} == seeds
+
+
+@pytest.fixture
+def examples():
+    folder = MINI / "dataset"
+    chosen = read_examples(folder / "examples.csv")[:12]
+    return ExampleSet(folder / "fields.nc", chosen, read_scaling(folder / "normalisation.json"))
+
+
+def test_workers_give_the_same_batches_after_the_parent_has_read(examples):
+    """HDF5 breaks where a forked process goes on with its parent's file."""
+    alone = list(DataLoader(examples, 5))
+    shared = list(DataLoader(examples, 5, num_workers=2))
+    for ours, theirs in zip(alone, shared, strict=True):
+        assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+def test_an_example_is_its_sample_moved_and_scaled(examples):
+    for number in (0, 5, 11):
+        example = examples.examples[number]
+        (sample,) = read_samples(examples.stack, [example.sample])
+        moved = apply(sample.fields, Element.from_index(example.element))
+        found = examples.scaling.inverse(examples[number][1].numpy())
+        assert np.abs(found - moved).max() < 1e-5 * np.abs(moved).max()
+
+
+def test_the_tutorial_runs():
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(), re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(blocks)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "83 examples; inputs (5, 64, 64), targets (8, 64, 64)" in done.stdout
+
+
+def test_the_storage_benchmark_prints_its_tables():
+    command = [sys.executable, "-m", "raptor.benchmark.storage", str(MINI), "--samples", "8"]
+    done = subprocess.run([*command, "--channels", "2"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    for text in ("zstd 9", "zlib 1, 15 bits", "loader, 2 workers", "training, 2 base channels"):
+        assert text in done.stdout

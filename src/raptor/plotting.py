@@ -149,23 +149,41 @@ def training_figure(history: pd.DataFrame) -> Figure:
 
 
 @STYLED
-def design_figure(design: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
-    """Distributions of the parameters and of the moulds, and a few moulds drawn."""
-    figure = new_figure(11.0, 6.0)
-    top, bottom = cast(Any, figure.subfigures(2, 1, height_ratios=[1.2, 1]))
-    panels = top.subplots(1, 4)
-    panels[0].hist(design["delta"], bins=18, range=(0.05, 0.95), color=SIMULATED)
+def design_figure(table: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
+    """Distributions of a design, and moulds drawn.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The design, a row a simulation, with the mould's `area` (l0^2), `tethers` and `symmetry`.
+    moulds : sequence of Mould
+        Moulds to draw.
+    """
+    figure = new_figure(12.0, 4.8)
+    top, bottom = cast(Any, figure.subfigures(2, 1, height_ratios=[1.8, 1]))
+    panels = top.subplots(1, 5)
+    edge = table["edge"].astype(bool)
+    panels[0].hist(
+        [table["delta"][~edge], table["delta"][edge]], bins=18, range=(0.05, 0.95), stacked=True,
+        color=[SIMULATED, PREDICTED], label=["drawn", "at an end"],
+    )  # fmt: skip
     panels[0].set(xlabel=r"$\Delta$", ylabel="simulations")
-    panels[1].plot(design["kappa_nnn"], design["kappa_nnnn"], ".", color=SIMULATED, ms=4)
+    panels[0].legend(frameon=False, fontsize=7)
+    dots = {"ms": 3, "alpha": min(1.0, 150 / len(table) + 0.15), "mew": 0, "rasterized": True}
+    panels[1].plot(table["kappa_nnn"], table["kappa_nnnn"], "o", color=SIMULATED, **dots)
     panels[1].plot([0.1, 0.71], [0.1 / np.sqrt(2), 0.71 / np.sqrt(2)], "--", color=THIRD, lw=0.8)
     panels[1].set(xlabel=r"$\kappa_{NNN}/\kappa_0$", ylabel=r"$\kappa_{NNNN}/\kappa_0$")
-    panels[2].hist([m.depression.area for m in moulds], bins=15, color=SIMULATED)
+    panels[2].hist(table["area"], bins=15, color=SIMULATED)
     panels[2].set(xlabel="area of the depression ($l_0^2$)")
-    names, counts = np.unique([m.symmetry for m in moulds], return_counts=True)
-    panels[3].barh(names, counts, color=SIMULATED)
-    panels[3].set(xlabel="moulds by symmetry class")
+    tethers, counts = np.unique(table["tethers"], return_counts=True)
+    panels[3].bar(tethers, counts, color=SIMULATED)
+    panels[3].set(xlabel="tethers a mould")
+    names, counts = np.unique(table["symmetry"], return_counts=True)
+    panels[4].barh([name.replace("_", " ") for name in names], counts, color=SIMULATED)
+    panels[4].set(xlabel="moulds by symmetry class")
     for axes, mould in zip(bottom.subplots(1, 8), moulds, strict=False):
         draw_mould(axes, mould)
+        axes.spines[:].set_visible(False)
     return figure
 
 

@@ -73,7 +73,7 @@ def test_corners_and_edges_of_the_parameters(delta, kappas, layers):
     assert tissue.folded_fraction == 0
     assert tissue.converged
     system = build_system(POSTED, parameters, model)
-    cast = cast_state(system.lattice, np.random.default_rng(2))
+    cast = cast_state(system.lattice.sites, np.random.default_rng(2))
     assert tissue.energy + tissue.wall_energy <= 0.5 * objective(cast, system.network, NO_WALLS, delta)[0]
     if delta == 0:
         assert tissue.energy == pytest.approx(0, abs=1e-9)
@@ -111,7 +111,7 @@ def test_what_is_said_to_be_left_of_the_gradient_is_left():
 def test_agitation_moves_cells_from_its_first_sweeps(delta):
     """Proposals start at about the thermal amplitude, not so large that all are refused."""
     system = build_system(POSTED, MIDDLE, NetworkModel(2))
-    state = cast_state(system.lattice, np.random.default_rng(0))
+    state = cast_state(system.lattice.sites, np.random.default_rng(0))
     state = minimise(state, system.network, system.walls, delta, tolerance=1e-2, limit=500).state
     for sweeps in (5, 50):
         found = anneal(
@@ -179,7 +179,7 @@ def test_rounds_never_end_higher():
     system = build_system(POSTED, MIDDLE, NetworkModel(2))
     rng = np.random.default_rng(0)
     contraction = ACCURACIES["standard"].contraction
-    state = cast_state(system.lattice, rng)
+    state = cast_state(system.lattice.sites, rng)
     before = contract(state, system, MIDDLE.delta, contraction, rng)
     after = refine(before, system, MIDDLE.delta, contraction, rng, rounds=3, sweeps=50)
     assert after.energy + after.walled <= before.energy + before.walled
@@ -250,7 +250,7 @@ def test_same_seed_same_tissue_and_another_seed_another():
 def test_minimisation_never_raises_the_objective():
     lattice = build_lattice(POSTED, SOFT, NetworkModel(2))
     network, walls = build_network(lattice), build_walls(POSTED, lattice.height)
-    state = cast_state(lattice, np.random.default_rng(0))
+    state = cast_state(lattice.sites, np.random.default_rng(0))
     before = np.inf
     for limit in (5, 20, 80, 320, 1280):
         found = minimise(state, network, walls, 0.9, tolerance=0.0, limit=limit)
@@ -268,7 +268,7 @@ def test_metropolis_samples_boltzmanns_distribution():
     walls = build_walls(pair, model.height)
     lattice = build_lattice(Mould(shapely.box(-0.4, -0.4, 1.4, 0.4)), parameters, NetworkModel(1))
     order, network = build_sublattices(lattice)
-    state = cast_state(lattice, np.random.default_rng(0)).reshape(6, -1)
+    state = cast_state(lattice.sites, np.random.default_rng(0)).reshape(6, -1)
     state[2] += 2.0  # away from floor and fill height
     temperature, rng, lengths = 0.02, np.random.default_rng(1), []
     state = state.ravel()
@@ -297,7 +297,7 @@ def test_metropolis_samples_boltzmanns_distribution_of_orientations():
         Mould(shapely.box(-0.4, -0.4, 1.4, 0.4)), CellParameters(delta, 0, 0), NetworkModel(1)
     )
     order, network = build_sublattices(lattice)
-    state, rng = cast_state(lattice, np.random.default_rng(0)), np.random.default_rng(1)
+    state, rng = cast_state(lattice.sites, np.random.default_rng(0)), np.random.default_rng(1)
     walls, along, lengths = build_walls(pair, 8.0), [], []
     for _ in range(6000):
         state = anneal(

@@ -41,7 +41,7 @@ class Rate:
 def disturbed_state(lattice: Lattice) -> NDArray[np.float64]:
     """A cast state with some noise, so that no bond is at rest."""
     rng = np.random.default_rng(0)
-    state = cast_state(lattice, rng)
+    state = cast_state(lattice.sites, rng)
     state[: 3 * lattice.cells] += 0.05 * rng.normal(size=3 * lattice.cells)
     return state
 
@@ -94,7 +94,7 @@ def trial_rates(mould: Mould, parameters: CellParameters, model: NetworkModel) -
     """Trial moves a second at one temperature; ours with walls and proposals that adapt."""
     delta, temperature = parameters.delta, 1e-3
     lattice = build_system(mould, parameters, model).lattice
-    state, table = cast_state(lattice, np.random.default_rng(0)), neighbour_table(lattice)
+    state, table = cast_state(lattice.sites, np.random.default_rng(0)), neighbour_table(lattice)
     rng = np.random.default_rng(0)
 
     def plain() -> None:
@@ -104,7 +104,7 @@ def trial_rates(mould: Mould, parameters: CellParameters, model: NetworkModel) -
     yield Rate("plain loop, float64", SWEEPS * lattice.cells / seconds(plain))
     for precision in (np.float64, np.float32):
         system = build_system(mould, parameters, model, precision)
-        start = cast_state(lattice, np.random.default_rng(0)).astype(precision)
+        start = cast_state(lattice.sites, np.random.default_rng(0)).astype(precision)
 
         def ours(system: System = system, start: NDArray[Any] = start) -> None:
             anneal(

@@ -48,7 +48,7 @@ def contraction_step(
 ) -> tuple[System, Array, float]:
     """A system, the state half-way through its contraction, and the next Delta."""
     system = build_system(mould, parameters, model)
-    state = cast_state(system.lattice, np.random.default_rng(0))
+    state = cast_state(system.lattice.sites, np.random.default_rng(0))
     path = steps_to(parameters.delta, 0.1)
     middle = len(path) // 2
     for delta in path[:middle]:

@@ -163,7 +163,7 @@ def simulate(
     state = minimum.state.astype(np.float64)
     touching = _contact_energy(minimum, system, parameters.delta)
     if not mould.tethers:
-        state = _undrifted(state, lattice.sites, mould)
+        state = undrifted(state, lattice.sites, mould)
     return Simulation(
         sites=lattice.sites,
         positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
@@ -188,7 +188,7 @@ def _contact_energy(minimum: Minimum, system: System, delta: float) -> float:
     return objective(minimum.state, system.network, NO_WALLS, delta, minimum.contact)[1]
 
 
-def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
+def undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
     """The state moved and turned in the plane as a whole, so that it lies as it was cast.
 
     Nothing holds a gel without tethers: moved or turned with its cells it has the same energy.
@@ -208,7 +208,7 @@ def _undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mo
 
 def _solve(system: System, delta: float, accuracy: Accuracy, rng: Generator) -> tuple[Minimum, int]:
     """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
-    state = cast_state(system.lattice, rng).astype(accuracy.precision)
+    state = cast_state(system.lattice.sites, rng).astype(accuracy.precision)
     sweeps = accuracy.anneal_sweeps
     if sweeps:
         annealed = anneal(state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps)

@@ -107,7 +107,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
 
 def connect(sites: NDArray[np.float64], parameters: CellParameters, model: NetworkModel) -> Lattice:
     """Build the bonds between sites (cells, 3) given by layer, then y, then x, as cast."""
-    index = _site_numbers(sites, model.layers)
+    index = site_numbers(sites, model.layers)
     kappas = (1.0, parameters.kappa_nnn, parameters.kappa_nnnn)
     groups = [
         (*_bonds_along(index, offset), kappa, SHELL_DISTANCE[shell])
@@ -126,7 +126,7 @@ def connect(sites: NDArray[np.float64], parameters: CellParameters, model: Netwo
     )
 
 
-def _site_numbers(sites: NDArray[np.float64], layers: int) -> NDArray[np.int32]:
+def site_numbers(sites: NDArray[np.float64], layers: int) -> NDArray[np.int32]:
     """Number of the site at each place of the grid [layer, y, x] of half l0, -1 where empty."""
     layer = np.rint(sites[:, 2] * np.sqrt(2) - 0.5).astype(int)
     column, row = (np.rint(2 * sites[:, axis]).astype(int) + 2 * HALF_SPAN for axis in (0, 1))

@@ -39,8 +39,8 @@ def build_system(
     return System(lattice, build_network(lattice, precision), *build_sublattices(lattice, precision), walls)
 
 
-def cast_state(lattice: Lattice, rng: Generator) -> NDArray[np.float64]:
-    """The state (6 * cells,) at casting: cells on their sites, orientations uniform on the sphere."""
-    orientation = rng.normal(size=(3, lattice.cells))
+def cast_state(sites: NDArray[np.float64], rng: Generator) -> NDArray[np.float64]:
+    """The state (6 * cells,) at casting: cells on sites (cells, 3), orientations uniform on the sphere."""
+    orientation = rng.normal(size=(3, len(sites)))
     orientation /= np.linalg.norm(orientation, axis=0)
-    return np.concatenate([lattice.sites.T.ravel(), orientation.ravel()])
+    return np.concatenate([sites.T.ravel(), orientation.ravel()])

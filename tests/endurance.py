@@ -18,6 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from raptor.dataset.same import differences
+from raptor.dataset.shards import shard_paths
 from tests.small import ROOT
 
 CONFIGURATION = ROOT / "tests" / "workflow" / "config" / "endurance.yaml"
@@ -52,7 +53,7 @@ class Trial:
         return self.start().wait()
 
     def shards(self) -> list[Path]:
-        return sorted((self.results / "simulations").glob("*.nc"))
+        return shard_paths(self.results)
 
 
 def workers(folder: Path) -> list[int]:

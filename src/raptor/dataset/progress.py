@@ -6,7 +6,7 @@ from pathlib import Path
 
 from raptor.dataset.design import read_design
 from raptor.dataset.netcdf import open_file
-from raptor.dataset.shards import read_failures
+from raptor.dataset.shards import read_failures, shard_paths
 
 WINDOW = 1800.0  # s over which the rate is taken
 
@@ -46,7 +46,7 @@ def progress_of(folder: Path) -> Progress:
     """
     designed = len(read_design(folder / "design" / "design.csv"))
     now, done, failed, lately, since = time.time(), 0, 0, 0, 0.0
-    for path in sorted((folder / "simulations").glob("*.nc")):
+    for path in shard_paths(folder):
         with open_file(path) as file:
             made, took = file.dimensions["simulation"].size, float(file["wall_time"][:].sum())
         done += made

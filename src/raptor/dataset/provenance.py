@@ -6,7 +6,7 @@ from typing import Any
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
 from raptor.dataset.netcdf import open_file
-from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures
+from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures, shard_paths
 from raptor.dataset.stack import LONG_NAMES, read_table
 from raptor.errors import RaptorError
 from raptor.fields import SIGMA
@@ -70,7 +70,7 @@ def _describe(feature: dict[str, Any]) -> dict[str, Any]:
 
 def _trace_shard(folder: Path, simulation: int) -> dict[str, Any]:
     """The shard that holds a simulation, what made it, and how the simulation ended."""
-    for path in sorted((folder / "simulations").glob("*.nc")):
+    for path in shard_paths(folder):
         place = f"simulations/{path.name}"
         failures = read_failures(path)
         if simulation in failures:

@@ -186,6 +186,11 @@ def _columns(simulation: Simulation) -> NDArray[np.float64]:
     )
 
 
+def shard_paths(folder: Path) -> list[Path]:
+    """Shards of a results folder; not those that are being written, whose names begin with a dot."""
+    return sorted((Path(folder) / "simulations").glob("[0-9]*.nc"))
+
+
 def read_failures(path: Path, configuration: str | None = None) -> dict[int, str]:
     """Why simulations of a shard failed, by id; raises as `read_shard` does."""
     with _open_shard(path, configuration) as file:

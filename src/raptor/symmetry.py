@@ -82,6 +82,12 @@ class Element:
             matrix[image, 5] = rotation[a, 0] * rotation[b, 1] + rotation[a, 1] * rotation[b, 0]
         return matrix
 
+    @cached_property
+    def permutation(self) -> tuple[list[int], list[float]]:
+        """`channel_matrix` as the channel that each image is made from, and its sign."""
+        source = np.abs(self.channel_matrix).argmax(axis=1)
+        return source.tolist(), self.channel_matrix[np.arange(8), source].tolist()
+
 
 def move_pixels(image: NDArray[Any], element: Element) -> NDArray[Any]:
     """Move the pixels of a square image (..., y, x), rows ascending in y; values unchanged."""
@@ -97,7 +103,5 @@ def apply(fields: NDArray[np.floating], element: Element) -> NDArray[np.floating
     Scaled stacks transform alike, since the scaling commutes with D4 (dataset.scaling).
     """
     moved = move_pixels(fields, element)
-    matrix = element.channel_matrix
-    source = np.abs(matrix).argmax(axis=1)
-    sign = matrix[np.arange(8), source].astype(fields.dtype)
-    return np.ascontiguousarray(moved[..., source, :, :] * sign[:, None, None])
+    source, sign = element.permutation
+    return np.ascontiguousarray(moved[..., source, :, :] * np.array(sign, fields.dtype)[:, None, None])

@@ -51,8 +51,9 @@ def test_every_rule_is_complete():
 
 
 LAYERS = (
-    ("errors", "files", "compiled", "jobs", "parameters", "symmetry"), ("moulds",), ("condor", "morphology"),
-    ("fields", "metrics"), ("dataset",), ("surrogate",),
+    ("errors", "files", "compiled", "device", "jobs", "parameters", "symmetry"), ("moulds",),
+    ("condor", "morphology"),
+    ("fields", "fields_batch", "metrics"), ("dataset",), ("surrogate",),
     ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
@@ -71,7 +72,9 @@ def test_imports_run_one_way():
 
 
 def test_a_simulation_job_leaves_heavy_imports_alone():
-    modules = "raptor.dataset.design, raptor.dataset.shards, raptor.jobs, raptor.moulds"
+    modules = (
+        "raptor.dataset.design, raptor.dataset.shards, raptor.dataset.simulating, raptor.jobs, raptor.moulds"
+    )
     heavy = "{'torch', 'xarray', 'pandas', 'matplotlib', 'pydantic'}"
     done = run(sys.executable, "-c", f"import sys, {modules}; print({heavy} & set(sys.modules))")
     assert done.stdout.strip() == "set()", done.stdout + done.stderr

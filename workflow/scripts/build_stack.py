@@ -4,6 +4,7 @@ from pathlib import Path
 
 from raptor.dataset.design import read_design
 from raptor.dataset.stack import build_stack
+from raptor.device import chosen_device
 from raptor.jobs import logged, progress
 from raptor.moulds import moulds_by_id
 
@@ -18,5 +19,6 @@ with logged(snakemake.log[0]):
             snakemake.params.pixels,
             simulation_configuration=snakemake.params.simulation_configuration,
             configuration=snakemake.params.configuration,
+            device=chosen_device(snakemake.config["device"]),
             done=lambda row: done(f"sample {row}"),
         )

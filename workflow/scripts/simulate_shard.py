@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from raptor.dataset.design import read_design
-from raptor.dataset.shards import simulate_shard, write_shard
+from raptor.dataset.shards import write_shard
+from raptor.dataset.simulating import simulate_shard
+from raptor.device import chosen_device
 from raptor.jobs import logged, progress
 from raptor.moulds import moulds_by_id
 from raptor.parameters import NetworkModel
@@ -16,7 +18,12 @@ with logged(snakemake.log[0]):
     model = NetworkModel(params.layers, tuple(params.shells), params.tension)
     with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:
         simulations, failures = simulate_shard(
-            runs, moulds, model, params.accuracy, lambda run, outcome: done(f"{run.simulation}: {outcome}")
+            runs,
+            moulds,
+            model,
+            params.accuracy,
+            chosen_device(snakemake.config["device"]),
+            lambda run, outcome: done(f"{run.simulation}: {outcome}"),
         )
     write_shard(
         Path(snakemake.output.shard),

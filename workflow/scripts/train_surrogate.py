@@ -6,6 +6,7 @@ from raptor.configuration import content_hash
 from raptor.dataset.examples import read_examples
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
+from raptor.device import chosen_device
 from raptor.jobs import logged, progress
 from raptor.surrogate.inference import save
 from raptor.surrogate.networks import Architecture
@@ -16,12 +17,13 @@ with logged(snakemake.log[0]):
     table = read_table(stack)
     scaling = read_scaling(Path(snakemake.input.normalisation))
     architecture = Architecture(table.pixels, given["base_channels"], given["dropout"], given["patch_layers"])
-    names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1")
+    names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers")
+    names += ("precision", "compiled", "deterministic")
     rules = TrainingRules(
         **{name: given[name] for name in names},
         seed=snakemake.params.seed % 2**63,
         threads=snakemake.threads,
-        workers=given["workers"],
+        device=chosen_device(snakemake.config["device"]),
     )
     # A checkpoint goes on only if configuration and data are those that it was made from.
     files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]

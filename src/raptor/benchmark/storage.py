@@ -24,6 +24,7 @@ from raptor.dataset.examples import read_examples
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples, read_table
+from raptor.device import chosen_device
 from raptor.surrogate.networks import Architecture
 from raptor.surrogate.training import TrainingRules, samples_a_second
 
@@ -124,10 +125,11 @@ def main(
         table.add_column(head, justify="right")
     for count in map(int, workers.split(",")):
         table.add_row(f"loader, {count} workers", f"{loading_rate(dataset, batch_size, count):.0f}")
-    rules = TrainingRules(1, batch_size, 2e-4, 0.5, 100.0, 0, torch.get_num_threads())
-    device = "cuda" if torch.cuda.is_available() else f"{rules.threads} threads"
+    device, threads = chosen_device("auto"), torch.get_num_threads()
+    rules = TrainingRules(1, batch_size, 2e-4, 0.5, 100.0, 0, threads, device=device)
     rate = samples_a_second(Architecture(pixels, channels, 0.5, 3), rules)
-    table.add_row(f"training, {channels} base channels, {device}", f"{rate:.1f}")
+    place = "GPU" if device == "cuda" else f"{threads} threads"
+    table.add_row(f"training, {channels} base channels, {place}", f"{rate:.1f}")
     CONSOLE.print(table)
 
 

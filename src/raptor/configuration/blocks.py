@@ -151,6 +151,11 @@ class Surrogate(Block):
     beta1: float = Field(0.5, ge=0, lt=1, description="of Adam")
     lambda_l1: float = Field(1000.0, ge=0, description="weight of the L1 term (pix2pix: 100)")
     threads: Positive = Field(2, description="processor threads of training and prediction")
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="of the networks' layers in training; weights are float32"
+    )
+    compiled: bool = Field(False, description="let torch compile the networks: slower start, faster steps")
+    deterministic: bool = Field(True, description="the same weights every time; slower on a GPU")
     workers: int = Field(0, ge=0, le=64, description="processes that read examples ahead; 0: training does")
 
 

@@ -21,6 +21,7 @@ from raptor.configuration.blocks import (
 )
 from raptor.configuration.tradeoff import Tradeoff, TradeoffCase
 from raptor.dataset.design import DesignRules
+from raptor.device import Device
 from raptor.moulds.geometry import IMAGE_SIZE
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.parameters import Bounds, NetworkModel
@@ -31,6 +32,9 @@ class Configuration(Block):
 
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
+    device: Device = Field(
+        "auto", description="where simulations, images and the surrogate are made; auto: a GPU if one is seen"
+    )
     design: Design = Field(default_factory=lambda: Design())
     moulds: Moulds = Field(default_factory=lambda: Moulds())
     model: Model = Field(default_factory=lambda: Model())
@@ -48,6 +52,11 @@ class Configuration(Block):
             raise ValueError(
                 f"moulds.cells allows {self.moulds.cells[1]} cells, more than {self.model.layers} "
                 f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise model.layers"
+            )
+        if self.device == "cuda" and self.simulation.accuracy == "reference":
+            raise ValueError(
+                "device is cuda, where simulations are contracted at draft or standard; for accuracy: "
+                "reference choose device: auto or cpu"
             )
         for pixels in self.tradeoff.pixels:
             if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):

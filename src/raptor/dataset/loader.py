@@ -2,9 +2,11 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import h5py
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
@@ -43,12 +45,15 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
             self._file, self._reader = h5py.File(self.stack, "r"), os.getpid()
         return self._file
 
+    def sample(self, row: int, element: Element | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Scaled inputs (5, y, x) and targets (8, y, x) of a row of the stack, moved by an element of D4."""
+        element = element or Element(0, mirror=False)
+        file = self._open()
+        depression, tethers = (move_pixels(file[name][row], element) for name in ("depression", "tethers"))
+        inputs = scale_inputs(depression, tethers, self.parameters[row])
+        return inputs, self.scaling.forward(apply(file["fields"][row], element))
+
     def __getitem__(self, number: int) -> tuple[Tensor, Tensor]:
-        file, example = self._open(), self.examples[number]
-        element = Element.from_index(example.element)
-        depression, tethers = (
-            move_pixels(file[name][example.sample], element) for name in ("depression", "tethers")
-        )
-        inputs = scale_inputs(depression, tethers, self.parameters[example.sample])
-        target = self.scaling.forward(apply(file["fields"][example.sample], element))
+        example = self.examples[number]
+        inputs, target = self.sample(example.sample, Element.from_index(example.element))
         return torch.from_numpy(inputs), torch.from_numpy(target)

@@ -1,7 +1,6 @@
 """Shards: simulations as files, CF contiguous ragged arrays of cells."""
 
-import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor import MODEL_VERSION
-from raptor.condor.accuracy import Simulation, accuracy_named, simulate
+from raptor.condor.accuracy import Simulation, accuracy_named
 from raptor.condor.lattice import Lattice, connect
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
 from raptor.errors import RaptorError
-from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
-
-log = logging.getLogger("raptor")
 
 PARAMETERS = {
     "delta": "strength of the cell-matrix interaction",
@@ -80,44 +76,6 @@ class Shard:
     accuracy: str
     configuration: str
     failures: dict[int, str]
-
-
-def simulate_shard(
-    runs: list[Run],
-    moulds: dict[str, Mould],
-    model: NetworkModel,
-    accuracy: str,
-    done: Callable[[Run, Simulation | str], None] = lambda run, outcome: None,
-) -> tuple[dict[int, Simulation], dict[int, str]]:
-    """Simulate runs one after another; returns simulations and reasons of failure, by id.
-
-    A run that fails is tried once more, then given up, and the others go on. Want of memory or disk is
-    no run's fault and is raised, for the workflow to try the whole shard again. `done` is told of each
-    run its simulation or the reason why there is none.
-    """
-    simulations, failures = {}, {}
-    for run in runs:
-        outcome = _simulate(run, moulds, model, accuracy)
-        if isinstance(outcome, str):  # once more: not every cause of a failure stays
-            outcome = _simulate(run, moulds, model, accuracy)
-        if isinstance(outcome, str):
-            failures[run.simulation] = outcome
-        else:
-            simulations[run.simulation] = outcome
-        done(run, outcome)
-    return simulations, failures
-
-
-def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Simulation | str:
-    """The simulation of a run, or why it failed."""
-    try:
-        made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
-    except (RaptorError, ArithmeticError, np.linalg.LinAlgError) as error:
-        log.exception("simulation %d failed", run.simulation)
-        return f"{type(error).__name__}: {error}"
-    if not (np.isfinite(made.energy) and np.isfinite(made.positions).all()):
-        return "the solver met numbers that are not finite"
-    return made
 
 
 def write_shard(

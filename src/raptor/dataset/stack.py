@@ -44,9 +44,16 @@ class Sample:
     converged: bool
 
 
-def record_fields(record: Record, pixels: int) -> NDArray[np.float64]:
+def record_fields(record: Record, pixels: int, device: str = "cpu") -> NDArray[np.float32]:
     """The eight fields (8, pixels, pixels) of a simulation read from a shard."""
-    return rasterise(record.positions, record.orientation, record.tension, pixels)
+    cells = (record.positions, record.orientation, record.tension)
+    if device == "cpu":
+        return rasterise(*cells, pixels).astype(np.float32)
+    import torch  # here: without a GPU the stack is built without it
+
+    from raptor.fields_batch import rasterise as rasterise_on
+
+    return rasterise_on(*cells, pixels, torch.device(device))
 
 
 def build_stack(
@@ -58,9 +65,10 @@ def build_stack(
     *,
     simulation_configuration: str,
     configuration: str,
+    device: str = "cpu",
     done: Callable[[int], None] = lambda sample: None,
 ) -> None:
-    """Rasterise every simulation of the shards into one file, sample by sample.
+    """Rasterise every simulation of the shards, on a device, into one file, sample by sample.
 
     Simulations that failed are left out; attribute `missing` names them.
 
@@ -95,7 +103,7 @@ def build_stack(
                 write(
                     row,
                     Sample(
-                        record_fields(record, pixels).astype(np.float32),
+                        record_fields(record, pixels, device),
                         image.depression.astype(np.uint8),
                         image.tethers.astype(np.uint8),
                         run.parameters,

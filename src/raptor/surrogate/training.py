@@ -1,8 +1,9 @@
 """Training of pix2pix: resumable, deterministic, the best weights kept."""
 
 import logging
+import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,13 @@ import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor, nn
-from torch.utils.data import DataLoader
 
 from raptor.dataset.examples import Example
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
+from raptor.surrogate.feeding import Batches, Feeder
 from raptor.surrogate.losses import discriminator_loss, generator_loss
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
 from raptor.symmetry import FIELDS
@@ -48,6 +49,14 @@ class TrainingRules:
         Processor threads; trained weights are equal for an equal number.
     workers : int
         Processes that read examples ahead; weights do not depend on them.
+    device : str
+        cpu or cuda.
+    precision : str
+        float32, or bfloat16 where networks are evaluated (weights, losses and steps stay float32).
+    compiled : bool
+        Whether torch compiles the networks.
+    deterministic : bool
+        Whether only operations are used that give the same weights every time, where torch has them.
     """
 
     epochs: int
@@ -58,15 +67,21 @@ class TrainingRules:
     seed: int
     threads: int
     workers: int = 0
+    device: str = "cpu"
+    precision: str = "float32"
+    compiled: bool = False
+    deterministic: bool = True
 
 
 @dataclass
 class _State:
-    """Everything that training changes."""
+    """Everything that training changes; `generate` and `judge` evaluate the two networks."""
 
     generator: Generator
     discriminator: Discriminator
     optimisers: tuple[torch.optim.Adam, torch.optim.Adam]
+    generate: Callable[[Tensor], Tensor]
+    judge: Callable[[Tensor, Tensor], Tensor]
     history: list[dict[str, float]]
     best: dict[str, Tensor]
 
@@ -121,23 +136,20 @@ def train(
     RaptorError
         Where a split has no example, or the loss is no longer finite.
     """
-    torch.set_num_threads(rules.threads)
-    torch.use_deterministic_algorithms(True, warn_only=True)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    chosen = {
-        name: ExampleSet(stack, [e for e in examples if splits[e.sample] == name], scaling)
-        for name in ("train", "validation")
-    }
-    for name, dataset in chosen.items():
-        if not len(dataset):
+    device = _prepare(rules)
+    feeders = {}
+    for name in ("train", "validation"):
+        chosen = [example for example in examples if splits[example.sample] == name]
+        if not chosen:
             raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
+        feeders[name] = Feeder(ExampleSet(stack, chosen, scaling), device, rules.workers)
     state = _start(architecture, rules, device)
     _resume(state, checkpoint, identity, device)
     for epoch in range(len(state.history), rules.epochs):
         started = time.perf_counter()
-        losses = _train_epoch(state, chosen["train"], rules, epoch, device)
-        batches = DataLoader(chosen["validation"], rules.batch_size, num_workers=rules.workers)
-        error = validation_error(state.generator, batches, device)
+        losses = _train_epoch(state, feeders["train"], rules, epoch)
+        held_out = feeders["validation"]
+        error = validation_error(state.generator, held_out.batches(range(len(held_out)), rules.batch_size))
         row = {"epoch": epoch, **losses, "validation_error": error}
         row["seconds"] = time.perf_counter() - started
         if not np.isfinite(list(row.values())).all():
@@ -154,17 +166,44 @@ def train(
     return Trained(state.best, pd.DataFrame(state.history))
 
 
+def _prepare(rules: TrainingRules) -> torch.device:
+    """Threads, determinism and device as the rules have them."""
+    torch.set_num_threads(rules.threads)
+    if rules.deterministic:
+        os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS may not repeat itself
+    torch.use_deterministic_algorithms(rules.deterministic, warn_only=True)
+    torch.backends.cudnn.benchmark = not rules.deterministic
+    return torch.device(rules.device)
+
+
 def _start(architecture: Architecture, rules: TrainingRules, device: torch.device) -> _State:
     torch.manual_seed(rules.seed)
     generator, discriminator = Generator(architecture), Discriminator(architecture)
-    networks: list[nn.Module] = [generator, discriminator]
-    optimisers = tuple(
-        torch.optim.Adam(
-            initialise(network).to(device).parameters(), rules.learning_rate, (rules.beta1, 0.999)
-        )
-        for network in networks
-    )
-    return _State(generator, discriminator, (optimisers[0], optimisers[1]), [], {})
+    # Convolutions of a GPU's tensor cores want the channels together.
+    layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
+    for network in (generator, discriminator):
+        initialise(network).to(device=device, memory_format=layout)  # type: ignore[call-overload]
+    optimisers = [
+        torch.optim.Adam(network.parameters(), rules.learning_rate, (rules.beta1, 0.999))
+        for network in (generator, discriminator)
+    ]
+    generate: Callable[[Tensor], Tensor] = _evaluated(generator, rules)
+    judge: Callable[[Tensor, Tensor], Tensor] = _evaluated(discriminator, rules)
+    return _State(generator, discriminator, (optimisers[0], optimisers[1]), generate, judge, [], {})
+
+
+def _evaluated(network: nn.Module, rules: TrainingRules) -> Callable[..., Tensor]:
+    """A network as it is evaluated in training: compiled, and in the precision asked for."""
+    called: Callable[..., Tensor] = torch.compile(network) if rules.compiled else network
+    if rules.precision == "float32":
+        return called
+
+    def evaluate(*images: Tensor) -> Tensor:
+        with torch.autocast(rules.device, torch.bfloat16):
+            found = called(*images)
+        return found.float()
+
+    return evaluate
 
 
 def _resume(state: _State, checkpoint: Path, identity: str, device: torch.device) -> None:
@@ -180,12 +219,10 @@ def _resume(state: _State, checkpoint: Path, identity: str, device: torch.device
         log.info("resumed after epoch %d", len(state.history) - 1)
 
 
-def _train_epoch(
-    state: _State, dataset: ExampleSet, rules: TrainingRules, epoch: int, device: torch.device
-) -> dict[str, float]:
+def _train_epoch(state: _State, feeder: Feeder, rules: TrainingRules, epoch: int) -> dict[str, float]:
     """One pass over the examples in an order of the epoch's own; returns mean losses."""
     torch.manual_seed(int(np.random.SeedSequence([rules.seed, epoch]).generate_state(1)[0]))
-    order = torch.randperm(len(dataset)).tolist()
+    order = torch.randperm(len(feeder)).tolist()
     if len(order) % rules.batch_size == 1 and len(order) > 1:
         order.pop()  # a batch of one has no statistics to normalise by
     rate = rules.learning_rate * min(1.0, 2 * (1 - epoch / rules.epochs))
@@ -194,41 +231,33 @@ def _train_epoch(
             group["lr"] = rate
     state.generator.train()
     state.discriminator.train()
-    sums = {"generator_loss": 0.0, "l1": 0.0, "discriminator_loss": 0.0}
-    batches = 0
-    for inputs, target in DataLoader(dataset, rules.batch_size, sampler=order, num_workers=rules.workers):
-        losses = _step(state, inputs.to(device), target.to(device), rules.lambda_l1)
-        sums = {key: value + losses[key] for key, value in sums.items()}
-        batches += 1
-    return {key: value / batches for key, value in sums.items()}
+    losses = [
+        _step(state, inputs, target, rules.lambda_l1)
+        for inputs, target in feeder.batches(order, rules.batch_size)
+    ]
+    # Read once an epoch: a GPU need not wait for the processor at every step.
+    means = torch.stack(losses).mean(0).tolist()
+    return dict(zip(("generator_loss", "l1", "discriminator_loss"), means, strict=True))
 
 
-def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> dict[str, float]:
-    """One step of the discriminator, then one of the generator."""
-    prediction = state.generator(inputs)
+def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> Tensor:
+    """One step of the discriminator, then one of the generator; returns their losses and L1, (3,)."""
+    prediction = state.generate(inputs)
     state.optimisers[1].zero_grad(set_to_none=True)
-    judged = discriminator_loss(
-        state.discriminator(inputs, target), state.discriminator(inputs, prediction.detach())
-    )
+    judged = discriminator_loss(state.judge(inputs, target), state.judge(inputs, prediction.detach()))
     judged.backward()  # type: ignore[no-untyped-call]
     state.optimisers[1].step()
 
     state.optimisers[0].zero_grad(set_to_none=True)
     state.discriminator.requires_grad_(False)
-    loss = generator_loss(state.discriminator(inputs, prediction), prediction, target, lambda_l1)
+    loss = generator_loss(state.judge(inputs, prediction), prediction, target, lambda_l1)
     loss.total.backward()  # type: ignore[no-untyped-call]
     state.discriminator.requires_grad_(True)
     state.optimisers[0].step()
-    return {
-        "generator_loss": float(loss.total.detach()),
-        "l1": float(loss.l1.detach()),
-        "discriminator_loss": float(judged.detach()),
-    }
+    return torch.stack([loss.total.detach(), loss.l1.detach(), judged.detach()]).double()
 
 
-def validation_error(
-    generator: Generator, batches: Iterable[tuple[Tensor, Tensor]], device: torch.device
-) -> float:
+def validation_error(generator: Generator, batches: Batches) -> float:
     """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
 
     Error and variance are summed over the examples before they are divided: an example in which
@@ -238,25 +267,27 @@ def validation_error(
     error, variance = np.zeros(len(SCORED)), np.zeros(len(SCORED))
     with torch.no_grad():
         for inputs, target in batches:
-            predicted = generator(inputs.to(device))[:, SCORED].cpu()
-            wanted = target[:, SCORED]
-            error += ((predicted - wanted) ** 2).mean(dim=(2, 3), dtype=torch.float64).sum(dim=0).numpy()
-            variance += wanted.double().var(dim=(2, 3), correction=0).sum(dim=0).numpy()
+            predicted, wanted = generator(inputs)[:, SCORED], target[:, SCORED]
+            error += (
+                ((predicted - wanted) ** 2).mean(dim=(2, 3), dtype=torch.float64).sum(dim=0).cpu().numpy()
+            )
+            variance += wanted.double().var(dim=(2, 3), correction=0).sum(dim=0).cpu().numpy()
     return float(np.sqrt(error / np.maximum(variance, 1e-12)).mean())
 
 
 def samples_a_second(architecture: Architecture, rules: TrainingRules, steps: int = 3) -> float:
     """Examples a second that steps of training take, reading left out; for benchmarks."""
-    torch.set_num_threads(rules.threads)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    device = _prepare(rules)
     state = _start(architecture, rules, device)
     shape = (rules.batch_size, architecture.pixels, architecture.pixels)
     inputs = torch.randn(shape[0], len(INPUTS), *shape[1:], device=device)
     target = torch.randn(shape[0], len(FIELDS), *shape[1:], device=device)
-    _step(state, inputs, target, rules.lambda_l1)  # the first one also plans
+    for _ in range(2):  # the first ones also plan and compile
+        _step(state, inputs, target, rules.lambda_l1).tolist()
     started = time.perf_counter()
     for _ in range(steps):
-        _step(state, inputs, target, rules.lambda_l1)  # ends with its losses on the processor
+        losses = _step(state, inputs, target, rules.lambda_l1)
+    losses.tolist()  # waits for a GPU to be done
     return steps * rules.batch_size / (time.perf_counter() - started)
 
 

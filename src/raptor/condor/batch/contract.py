@@ -300,7 +300,7 @@ def _batched(name: str) -> Accuracy:
     accuracy = accuracy_named(name)
     if accuracy.anneal_sweeps or accuracy.rounds:
         raise RaptorError(
-            f"accuracy is '{name}'; batches of tissues (device: cuda) are contracted at draft or standard, "
-            "choose one of these or device: cpu"
+            f"accuracy is '{name}'; tissues are contracted in batches at draft or standard; choose "
+            "one of these, or device: cpu"
         )
     return accuracy

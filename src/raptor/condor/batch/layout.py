@@ -20,7 +20,7 @@ from raptor.condor.walls import Walls, build_walls
 from raptor.moulds.geometry import Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 
-BLOCK = 256
+BLOCK = 128
 ROW = 6 * BLOCK  # numbers of a block
 
 

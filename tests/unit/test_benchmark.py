@@ -1,5 +1,7 @@
 """The benchmark runs, and its baselines compute the same physics."""
 
+import json
+import os
 import subprocess
 import sys
 
@@ -17,6 +19,7 @@ from raptor.condor.energy import objective, unit_orientations
 from raptor.condor.network import build_network
 from raptor.condor.system import build_system
 from raptor.condor.walls import NO_WALLS
+from tests.small import ROOT
 
 
 def test_baselines_have_the_energy_and_gradient_of_the_kernel(lattice, random_state):
@@ -58,3 +61,20 @@ def test_the_benchmark_prints_its_tables():
     assert done.returncode == 0, done.stderr[-2000:]
     for title in ("Gradient", "bounds", "Trial moves", "preconditioners", "Whole runs", "to the power"):
         assert title in done.stdout
+
+
+def test_the_gpu_script_runs_whole_on_a_processor(tmp_path):
+    output = tmp_path / "gpu.json"
+    command = [
+        sys.executable, "-m", "raptor.benchmark.gpu", str(ROOT / "tests" / "workflow" / "config" / "tiny.yaml"),
+        "--output", str(output), "--device", "cpu", "--simulations", "2", "--checked", "2", "--channels", "2",
+    ]  # fmt: skip
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found = json.loads(output.read_text())
+    assert found["agreement"]["moulds"] == found["agreement"]["converged"] == 2
+    assert found["design"]["simulations"] == 2
+    assert found["design"]["of"] == 8
+    for row in ("all of them, extrapolated", "training, samples a second", "of the measured arithmetic"):
+        assert row in done.stdout

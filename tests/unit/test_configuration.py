@@ -3,6 +3,7 @@ import json
 import jsonschema
 import pytest
 import yaml
+from pydantic import ValidationError
 
 from raptor.configuration import Configuration, Tissue, load, load_tissues
 from raptor.errors import RaptorError
@@ -89,3 +90,24 @@ def test_a_bad_configuration_is_named(tmp_path, text, message):
 def test_a_tissue_needs_a_measurement():
     with pytest.raises(ValueError, match="neither area_ratio nor width_ratio"):
         Tissue.model_validate({"description": "x", "mould": "y"})
+
+
+def test_a_gpu_is_not_made_up(monkeypatch):
+    """Here, whatever the machine has: nvidia-smi and torch are told to see none, or one."""
+    import torch
+
+    from raptor.device import chosen_device
+
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert chosen_device("cpu") == chosen_device("auto") == "cpu"
+    with pytest.raises(RaptorError, match=r"sees no GPU; choose device: auto or cpu"):
+        chosen_device("cuda")
+    with pytest.raises(RaptorError, match="allowed are auto, cpu, cuda"):
+        chosen_device("gpu")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    assert chosen_device("cuda") == "cuda"
+
+
+def test_a_gpu_contracts_at_draft_and_standard_only():
+    with pytest.raises(ValidationError, match="accuracy: reference choose device: auto or cpu"):
+        Configuration.model_validate({"device": "cuda", "simulation": {"accuracy": "reference"}})

@@ -1,15 +1,19 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 import torch
 
 from raptor.dataset.examples import augment, training_scaling
+from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
 from raptor.errors import RaptorError
 from raptor.fitting import Target, fit, parameters_at
 from raptor.moulds import Mould, mould_image
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.surrogate.feeding import Feeder
 from raptor.surrogate.inference import load, save
 from raptor.surrogate.losses import discriminator_loss, generator_loss
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
@@ -54,12 +58,16 @@ def test_losses():
 
 
 @pytest.fixture
-def training(made, tmp_path):
+def training_rules():
+    return TrainingRules(4, 4, 1e-3, 0.5, 100.0, 0, 1)
+
+
+@pytest.fixture
+def training(training_rules, made, tmp_path):
     stack = made / "dataset" / "fields.nc"
 
     def run(epochs, name, identity="a"):
-        rules = TrainingRules(4, 4, 1e-3, 0.5, 100.0, 0, 1)
-        rules = TrainingRules(**{**rules.__dict__, "epochs": epochs})
+        rules = replace(training_rules, epochs=epochs)
         return train(
             stack, augment(stack), read_table(stack).split, training_scaling(stack),
             Architecture(32, 4, 0.5), rules, tmp_path / name, identity,
@@ -72,6 +80,28 @@ def test_training_learns_and_is_repeatable(training):
     a, b = training(4, "a.pt"), training(4, "b.pt")
     assert a.history["l1"].iloc[-1] < a.history["l1"].iloc[0]
     assert all(torch.equal(a.weights[k], b.weights[k]) for k in a.weights)
+
+
+def test_training_in_bfloat16_keeps_float32_weights(training_rules, made, tmp_path):
+    stack = made / "dataset" / "fields.nc"
+    rules = replace(training_rules, epochs=2, precision="bfloat16", deterministic=False)
+    trained = train(
+        stack, augment(stack), read_table(stack).split, training_scaling(stack), Architecture(32, 4, 0.5),
+        rules, tmp_path / "half.pt", "half",
+    )  # fmt: skip
+    assert trained.history["l1"].iloc[-1] < trained.history["l1"].iloc[0]
+    assert {value.dtype for value in trained.weights.values()} == {torch.float32, torch.int64}
+
+
+def test_examples_kept_on_a_device_are_the_loaders(made):
+    stack = made / "dataset" / "fields.nc"
+    examples = ExampleSet(stack, augment(stack), training_scaling(stack))
+    kept, read = (Feeder(examples, torch.device("cpu"), resident=resident) for resident in (True, False))
+    order = torch.randperm(len(examples)).tolist()
+    batches = list(zip(kept.batches(order, 5), read.batches(order, 5), strict=True))
+    assert sum(len(inputs) for (inputs, _), _ in batches) == len(examples)
+    for ours, theirs in batches:
+        assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
 def test_training_resumed_is_training_undisturbed(training, tmp_path, monkeypatch):

@@ -1,8 +1,12 @@
 """What a change makes run again: the set of rules in the resolved DAG."""
 
+import subprocess
+
 import pytest
 import yaml
 
+from tests.small import ROOT
+from tests.workflow.conftest import TINY
 from tests.workflow.test_end_to_end import variant
 
 EVERYTHING = {
@@ -74,3 +78,17 @@ def test_targets_make_their_part(workplace):
     assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
     assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
     assert place.jobs("report") == EVERYTHING - {"all"}
+
+
+def test_a_gpu_s_profile_gives_it_to_one_job_at_a_time(workplace):
+    place = workplace("gpu")
+    profile = str(ROOT / "workflow" / "profiles" / "gpu")
+    done = place.run("--dry-run", "--cores", "4", "--workflow-profile", profile, "dataset")
+    assert done.returncode == 0, done.stderr
+    shown = done.stdout + done.stderr
+    assert shown.count("gpu=1") >= 4  # three shards and the stack
+    laid_over = place.command("--dry-run", "dataset")
+    laid_over.insert(laid_over.index(str(TINY)) + 1, str(ROOT / "config" / "gpu.yaml"))
+    done = subprocess.run(laid_over, capture_output=True, text=True, check=False, cwd=place.folder)
+    assert done.returncode == 0, done.stderr
+    assert "00000-00007.nc" in done.stdout + done.stderr  # one shard for the GPU

@@ -206,9 +206,9 @@ def _rows(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "all of them" + ("" if t["simulations"] == t["of"] else ", extrapolated"), f"{whole / 60:.1f} min"
     yield "their casting, on the processor", f"{t['cast_seconds']:.1f} s"
     yield "an image of eight fields", f"{1e3 * t['raster_seconds'] / t['simulations']:.2f} ms"
-    yield "directed bonds a second, whole contraction", f"{t['bonds'] / t['seconds'] / 1e9:.2f} G"
-    yield "directed bonds a second, gradient alone", f"{rates['bonds'] / 1e9:.2f} G"
-    yield "of the measured arithmetic", f"{100 * rates['bonds'] * OPERATIONS / at_most['operations']:.0f} %"
+    yield "directed bonds a second, whole contraction", f"{t['bonds'] / t['seconds'] / 1e6:.1f} M"
+    yield "directed bonds a second, gradient alone", f"{rates['bonds'] / 1e6:.1f} M"
+    yield "of the measured arithmetic", f"{100 * rates['bonds'] * OPERATIONS / at_most['operations']:.1f} %"
     yield (
         "of the measured copying, caches left out",
         f"{100 * rates['bonds'] * BYTES / at_most['bytes']:.0f} %",

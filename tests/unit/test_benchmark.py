@@ -66,7 +66,7 @@ def test_the_benchmark_prints_its_tables():
 def test_the_gpu_script_runs_whole_on_a_processor(tmp_path):
     output = tmp_path / "gpu.json"
     command = [
-        sys.executable, "-m", "raptor.benchmark.gpu", str(ROOT / "tests" / "workflow" / "config" / "tiny.yaml"),
+        sys.executable, "-m", "raptor.benchmark.gpu", str(ROOT / "tests/workflow/config/tiny.yaml"),
         "--output", str(output), "--device", "cpu", "--simulations", "2", "--checked", "2", "--channels", "2",
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"}

@@ -32,15 +32,16 @@ class Scaling:
     def forward(self, fields: NDArray[np.floating]) -> NDArray[np.float32]:
         """Physical fields (..., 8, y, x) to [-1, 1]."""
         offset, scale = self._constants()
-        return ((fields - offset) / scale).astype(np.float32)
+        return np.asarray((fields.astype(np.float32, copy=False) - offset) / scale)
 
     def inverse(self, scaled: NDArray[np.floating]) -> NDArray[np.float32]:
         """Scaled fields (..., 8, y, x) back to physical units."""
         offset, scale = self._constants()
-        return (scaled * scale + offset).astype(np.float32)
+        return np.asarray(scaled.astype(np.float32, copy=False) * scale + offset)
 
-    def _constants(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return np.array(self.offset)[:, None, None], np.array(self.scale)[:, None, None]
+    def _constants(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        offset, scale = (np.array(values, np.float32)[:, None, None] for values in (self.offset, self.scale))
+        return offset, scale
 
     def as_json(self) -> dict[str, Any]:
         """As it stands in `normalisation.json` and beside weights."""

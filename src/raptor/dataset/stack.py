@@ -143,7 +143,9 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         variable(file, axis, (axis,), centres, f"pixel centre {axis}, in l0")
     along = ("sample",)
     image, plane = (1, len(FIELDS), pixels, pixels), (1, pixels, pixels)
-    packed: dict[str, Any] = {"compression": "zlib", "complevel": 4, "shuffle": True}
+    # Every reader of netCDF has zlib; level 1 is as fast to read as any, and 3 % larger than level 4
+    # (docs/factory.md). Nothing is rounded: sums over pixels stay exact.
+    packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True}
     columns = {
         "fields": ("f4", ("sample", "field", "y", "x"), "fields, per pixel", {"chunksizes": image} | packed),
         "depression": ("u1", ("sample", "y", "x"), "1 where cells may be", {"chunksizes": plane} | packed),

@@ -78,7 +78,7 @@ def evaluate(
     for sample in read_samples(stack, read_table(stack).rows("test")):
         mould = moulds[sample.mould]
         masks = (sample.depression.astype(bool), sample.tethers.astype(bool))
-        prediction = surrogate.predict(*masks, [sample.parameters])[0]
+        prediction = surrogate.predict(*masks, [sample.parameters], sample.n_cells)[0]
         scored = (without_sign(prediction), without_sign(sample.fields))
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
         row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from raptor.condor.accuracy import Simulation
+from raptor.condor.lattice import cast_sites
 from raptor.errors import RaptorError
 from raptor.fields import rasterise
 from raptor.files import atomic_path
@@ -92,12 +93,14 @@ def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
 
 
 def surrogate_measure(surrogate: Surrogate, mould: Mould) -> Measure:
-    """Area and width ratio of a mould's tissue as the surrogate predicts them."""
+    """Area and width ratio of a mould's tissue as the surrogate predicts them, from one image for speed."""
+    cells = len(cast_sites(mould, surrogate.layers))
     image = mould_image(mould, surrogate.architecture.pixels)
     threshold = density_threshold(surrogate.layers, surrogate.architecture.pixels)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-        densities = surrogate.predict(image.depression, image.tethers, parameters)[:, 0]
+        fields = surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=False)
+        densities = fields[:, 0]
         return np.array(
             [
                 (area_ratio(density, image, threshold), width_ratio(density, mould, threshold))

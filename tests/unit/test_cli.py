@@ -114,8 +114,9 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     from raptor.surrogate.networks import Architecture, Generator, initialise
 
     architecture = Architecture(32, 4)
-    weights = initialise(Generator(architecture)).state_dict()
-    save(tmp_path, weights, architecture, Scaling((0.5,) * 8, (0.5,) * 8), 4, {}, "x")
+    scaling = Scaling((0.5,) * 8, (0.5,) * 8)
+    weights = initialise(Generator(architecture, scaling)).state_dict()
+    save(tmp_path, weights, architecture, scaling, 4, {}, "x")
     output = tmp_path / "prediction.nc"
     done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
     assert done.returncode == 0, done.stderr

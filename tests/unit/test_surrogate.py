@@ -27,7 +27,7 @@ SCALING = Scaling((0.0,) * 8, (1.0,) * 8)
 def test_the_networks_take_any_power_of_two(pixels):
     architecture = Architecture(pixels, 4)
     inputs, fields = torch.zeros(2, 5, pixels, pixels), torch.zeros(2, 8, pixels, pixels)
-    assert Generator(architecture)(inputs).shape == fields.shape
+    assert Generator(architecture, SCALING)(inputs, torch.ones(2)).shape == fields.shape
     for layers in (1, 3, 5):
         assert Discriminator(Architecture(pixels, 4, 0.5, layers))(inputs, fields).shape[:2] == (2, 1)
     with pytest.raises(RaptorError, match="power of two"):
@@ -44,7 +44,7 @@ def test_the_discriminator_sees_patches_of_seventy_pixels():
 
 
 def test_pix2pix_of_the_published_size_has_its_54_million_weights():
-    generator = Generator(Architecture(256, 64))
+    generator = Generator(Architecture(256, 64), SCALING)
     assert sum(p.numel() for p in generator.parameters()) == pytest.approx(54.4e6, rel=0.01)
 
 
@@ -104,6 +104,17 @@ def test_examples_kept_on_a_device_are_the_loaders(made):
         assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
+def test_the_compact_network_learns_without_a_discriminator(training_rules, made, tmp_path):
+    stack = made / "dataset" / "fields.nc"
+    rules = replace(training_rules, epochs=3, learning_rate=3e-3, adversarial=0.0)
+    trained = train(
+        stack, augment(stack), read_table(stack).split, training_scaling(stack),
+        Architecture(32, 4, network="compact"), rules, tmp_path / "compact.pt", "compact",
+    )  # fmt: skip
+    assert trained.history["l1"].iloc[-1] < trained.history["l1"].iloc[0]
+    assert (trained.history["discriminator_loss"] == 0).all()
+
+
 def test_training_resumed_is_training_undisturbed(training, tmp_path, monkeypatch):
     whole = training(4, "whole.pt")
     import raptor.surrogate.training as module
@@ -139,7 +150,7 @@ def test_a_checkpoint_of_another_training_or_cut_short_is_ignored(training, tmp_
 @pytest.fixture
 def model_folder(tmp_path):
     architecture = Architecture(32, 4)
-    generator = initialise(Generator(architecture))
+    generator = initialise(Generator(architecture, SCALING))
     save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, {}, "a")
     return tmp_path / "model"
 
@@ -148,9 +159,9 @@ def test_a_saved_model_predicts_the_same(model_folder):
     image = mould_image(BOX, 32)
     surrogate, again = load(model_folder), load(model_folder)
     parameters = [CellParameters(d, 0.5, 0.3) for d in (0.1, 0.9)]
-    a = surrogate.predict(image.depression, image.tethers, parameters)
+    a = surrogate.predict(image.depression, image.tethers, parameters, 190)
     assert a.shape == (2, 8, 32, 32)
-    assert np.array_equal(a, again.predict(image.depression, image.tethers, parameters))
+    assert np.array_equal(a, again.predict(image.depression, image.tethers, parameters, 190))
     assert not np.array_equal(a[0], a[1])
 
 
@@ -162,9 +173,9 @@ def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
         (CellParameters(0.5, 0.2, 0.3), "kappa_nnnn is 0.3, above kappa_nnn"),
     ):
         with pytest.raises(RaptorError, match=message):
-            surrogate.predict(masks, masks, [parameters])
+            surrogate.predict(masks, masks, [parameters], 9)
     with pytest.raises(RaptorError, match="takes 32 x 32"):
-        surrogate.predict(masks[1:], masks[1:], [])
+        surrogate.predict(masks[1:], masks[1:], [], 9)
     text = (model_folder / "model.json").read_text()
     (model_folder / "model.json").write_text(text.replace('"base_channels": 4', '"base_channels": 8'))
     with pytest.raises(RaptorError, match="does not fit the model"):

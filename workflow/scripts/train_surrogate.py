@@ -16,9 +16,10 @@ with logged(snakemake.log[0]):
     given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
     table = read_table(stack)
     scaling = read_scaling(Path(snakemake.input.normalisation))
-    architecture = Architecture(table.pixels, given["base_channels"], given["dropout"], given["patch_layers"])
+    sizes = {name: given[name] for name in ("base_channels", "dropout", "patch_layers", "network")}
+    architecture = Architecture(table.pixels, **sizes)
     names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers")
-    names += ("precision", "compiled", "deterministic")
+    names += ("precision", "compiled", "deterministic", "adversarial")
     rules = TrainingRules(
         **{name: given[name] for name in names},
         seed=snakemake.params.seed % 2**63,

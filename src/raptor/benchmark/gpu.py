@@ -32,6 +32,7 @@ from raptor.condor.batch.energy import objective
 from raptor.condor.batch.layout import BLOCK, build_batch, cast
 from raptor.configuration import Configuration, load
 from raptor.dataset.design import Run, sample_design
+from raptor.dataset.scaling import Scaling
 from raptor.device import chosen_device
 from raptor.fields import rasterise
 from raptor.fields_batch import rasterise as rasterise_on
@@ -41,6 +42,7 @@ from raptor.moulds.geometry import Mould
 from raptor.parameters import NetworkModel
 from raptor.surrogate.networks import Architecture, Generator
 from raptor.surrogate.training import TrainingRules, samples_a_second
+from raptor.symmetry import FIELDS
 
 CONSOLE = Console(width=110)
 OPERATIONS = 74  # of a directed bond, as counted for the compiled kernel
@@ -181,10 +183,11 @@ def gradient_rate(tasks: list[Task], model: NetworkModel, device: torch.device) 
 def prediction_seconds(architecture: Architecture, device: torch.device, batch: int) -> float:
     """Seconds a sample of the generator, in a batch, half precision on a GPU."""
     kind = torch.bfloat16 if device.type == "cuda" else torch.float32
-    generator = Generator(architecture).to(device, kind).eval()
+    plain = Scaling((0.0,) * len(FIELDS), (1.0,) * len(FIELDS))
+    generator = Generator(architecture, plain).to(device, kind).eval()
     inputs = torch.randn(batch, 5, architecture.pixels, architecture.pixels, device=device, dtype=kind)
     with torch.no_grad():
-        return seconds_of(lambda: generator(inputs), device) / batch
+        return seconds_of(lambda: generator(inputs, torch.ones(batch, device=device)), device) / batch
 
 
 def _prepared(configuration: Configuration, count: int) -> tuple[list[Run], list[Mould]]:

@@ -142,6 +142,12 @@ class Surrogate(Block):
     """
 
     model: Name = Field("pix2pix", description="name of the model's folder")
+    network: Literal["pix2pix", "compact"] = Field(
+        "pix2pix", description="the published U-Net, or a compact one whose fields obey the physics"
+    )
+    adversarial: float = Field(
+        1.0, ge=0, description="weight of the discriminator's judgement; 0 trains without one"
+    )
     base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
     dropout: float = Field(0.5, ge=0, lt=1, description="in the three deepest decoder layers")
     patch_layers: int = Field(3, ge=1, le=5, description="strided layers of the discriminator")

@@ -14,6 +14,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from raptor import MODEL_VERSION
+from raptor.condor.lattice import cast_sites
 from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.errors import RaptorError
@@ -22,8 +23,10 @@ from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image, pixel_centres
 from raptor.parameters import CellParameters
+from raptor.surrogate.feeding import apply
 from raptor.surrogate.networks import Architecture, Generator
-from raptor.symmetry import FIELDS
+from raptor.surrogate.physics import average, project
+from raptor.symmetry import FIELDS, Element, move_pixels
 
 BATCH = 16
 
@@ -42,8 +45,19 @@ class Surrogate:
         depression: NDArray[Any],
         tethers: NDArray[Any],
         parameters: Sequence[CellParameters],
+        cells: int,
+        *,
+        averaged: bool = True,
     ) -> NDArray[np.float32]:
         """Fields (n, 8, y, x) in physical units of one mould's masks (y, x) at n parameters.
+
+        They obey the physics (`surrogate.physics`). `averaged` over the eight images of D4, so that the
+        prediction of a turned mould is the turned prediction; then sxsz and sysz have no sign of their own.
+
+        Parameters
+        ----------
+        cells : int
+            Cells of the tissue, to which density sums.
 
         Raises
         ------
@@ -55,21 +69,55 @@ class Surrogate:
             raise RaptorError(f"masks are {depression.shape}; this model takes {pixels} x {pixels} pixels")
         for values in parameters:
             values.require_sampled("prediction")
+        if not parameters:
+            return np.empty((0, len(FIELDS), pixels, pixels), np.float32)
+        elements = Element.all() if averaged else Element.all()[:1]
+        images = [
+            scale_inputs(move_pixels(depression, element), move_pixels(tethers, element), values)
+            for values in parameters
+            for element in elements
+        ]
         self.generator.eval()
-        parts = []
         with torch.no_grad():
-            for start in range(0, len(parameters), BATCH):
-                batch = [
-                    scale_inputs(depression, tethers, values) for values in parameters[start : start + BATCH]
-                ]
-                scaled = self.generator(torch.from_numpy(np.stack(batch)))
-                parts.append(self.scaling.inverse(scaled.numpy()))
-        return np.concatenate(parts)
+            parts = [
+                self._physical(torch.from_numpy(np.stack(images[start : start + BATCH])), cells)
+                for start in range(0, len(images), BATCH)
+            ]
+            fields = torch.cat(parts).reshape(len(parameters), len(elements), len(FIELDS), pixels, pixels)
+            if averaged:
+                fields = torch.stack([_averaged(of_one, elements) for of_one in fields])
+            else:
+                fields = fields[:, 0]
+        return np.asarray(fields.numpy(), dtype=np.float32)
 
-    def predict_mould(self, mould: Mould, parameters: CellParameters) -> NDArray[np.float32]:
-        """Fields (8, y, x) of a mould at one set of parameters."""
+    def _physical(self, inputs: Tensor, cells: int) -> Tensor:
+        """Fields in physical units that obey the physics, for scaled inputs."""
+        counts = torch.full((len(inputs),), float(cells))
+        fields = torch.from_numpy(self.scaling.inverse(self.generator(inputs, counts).numpy()))
+        if self.generator.physical is not None:
+            return fields
+        return project(fields, 0.5 * (inputs[:, :1] + 1), counts)
+
+    def predict_mould(
+        self, mould: Mould, parameters: CellParameters, *, averaged: bool = True
+    ) -> NDArray[np.float32]:
+        """Fields (8, y, x) of a mould at one set of parameters.
+
+        Raises
+        ------
+        RaptorError
+            As `predict`, and where the mould holds no cell.
+        """
         image = mould_image(mould, self.architecture.pixels)
-        return np.asarray(self.predict(image.depression, image.tethers, [parameters])[0])
+        cells = len(cast_sites(mould, self.layers))
+        fields = self.predict(image.depression, image.tethers, [parameters], cells, averaged=averaged)
+        return np.asarray(fields[0])
+
+
+def _averaged(fields: Tensor, elements: Sequence[Element]) -> Tensor:
+    """Mean (8, y, x) of predictions (elements, 8, y, x) of a mould's images, each moved back."""
+    back = [apply(image, element.inverse) for image, element in zip(fields, elements, strict=True)]
+    return average(torch.stack(back))
 
 
 def save(
@@ -115,7 +163,7 @@ def load(folder: Path) -> Surrogate:
         scaling, layers = Scaling.from_json(content["normalisation"]), int(content["layers"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / 'model.json'} cannot be read: {error}") from error
-    generator = Generator(architecture)
+    generator = Generator(architecture, scaling)
     try:
         weights = folder / "weights.safetensors"
         with safe_open(weights, framework="pt") as file:

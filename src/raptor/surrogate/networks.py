@@ -1,4 +1,4 @@
-"""pix2pix (Isola et al. 2017, arXiv:1611.07004): U-Net generator and PatchGAN discriminator."""
+"""Networks: pix2pix (Isola et al. 2017, arXiv:1611.07004) and what stands in its generator's place."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -7,9 +7,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from raptor.dataset.scaling import INPUTS
+from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.errors import RaptorError
+from raptor.surrogate.compact import CompactUNet
+from raptor.surrogate.physics import PhysicalFields
 from raptor.symmetry import FIELDS
+
+NETWORKS = ("pix2pix", "compact")
 
 
 @dataclass(frozen=True)
@@ -27,16 +31,21 @@ class Architecture:
     patch_layers : int
         Strided layers of the discriminator, fewer on images below 32 pixels: 3 see patches of 70 x
         70 pixels.
+    network : str
+        "pix2pix", the published U-Net, or "compact", whose outputs obey the physics.
     """
 
     pixels: int
     base_channels: int
     dropout: float = 0.5
     patch_layers: int = 3
+    network: str = "pix2pix"
 
     def __post_init__(self) -> None:
         if not (16 <= self.pixels <= 1024 and self.pixels & (self.pixels - 1) == 0):
             raise RaptorError(f"pixels is {self.pixels}; a power of two from 16 to 1024 is needed")
+        if self.network not in NETWORKS:
+            raise RaptorError(f"network is '{self.network}'; allowed are {', '.join(NETWORKS)}")
 
     def as_json(self) -> dict[str, Any]:
         """As it stands in model.json."""
@@ -69,7 +78,25 @@ class _Up(nn.Sequential):
 
 
 class Generator(nn.Module):
-    """U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled."""
+    """From scaled inputs to scaled fields, by the architecture's network; physical where that is."""
+
+    def __init__(self, architecture: Architecture, scaling: Scaling) -> None:
+        super().__init__()
+        compact = architecture.network == "compact"
+        self.network = CompactUNet(architecture.base_channels) if compact else UNet(architecture)
+        self.physical = PhysicalFields(scaling) if compact else None
+
+    def forward(self, inputs: Tensor, cells: Tensor) -> Tensor:
+        """Fields (n, 8, y, x) of inputs (n, 5, y, x) and numbers of cells (n,)."""
+        found: Tensor = self.network(inputs)
+        if self.physical is None:
+            return found
+        fields: Tensor = self.physical(found.float(), 0.5 * (inputs[:, :1] + 1), cells)
+        return fields
+
+
+class UNet(nn.Module):
+    """pix2pix' U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled."""
 
     def __init__(self, architecture: Architecture) -> None:
         super().__init__()
@@ -131,7 +158,7 @@ class Discriminator(nn.Module):
 
 
 def initialise(network: nn.Module) -> nn.Module:
-    """Weights from N(0, 0.02), as published."""
+    """Weights from N(0, 0.02), as published for pix2pix."""
     for module in network.modules():
         if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
             nn.init.normal_(module.weight, 0.0, 0.02)

@@ -1,4 +1,4 @@
-"""Training of pix2pix: resumable, deterministic, the best weights kept."""
+"""Training of a surrogate: resumable, deterministic, the best weights kept."""
 
 import logging
 import os
@@ -43,6 +43,8 @@ class TrainingRules:
         the second half of the epochs.
     lambda_l1 : float
         Weight of the L1 term (100 in pix2pix).
+    adversarial : float
+        Weight of the discriminator's judgement (1 in pix2pix); 0 trains without one.
     seed : int
         Of first weights, order of examples and dropout.
     threads : int
@@ -71,6 +73,7 @@ class TrainingRules:
     precision: str = "float32"
     compiled: bool = False
     deterministic: bool = True
+    adversarial: float = 1.0
 
 
 @dataclass
@@ -80,7 +83,7 @@ class _State:
     generator: Generator
     discriminator: Discriminator
     optimisers: tuple[torch.optim.Adam, torch.optim.Adam]
-    generate: Callable[[Tensor], Tensor]
+    generate: Callable[[Tensor, Tensor], Tensor]
     judge: Callable[[Tensor, Tensor], Tensor]
     history: list[dict[str, float]]
     best: dict[str, Tensor]
@@ -143,13 +146,14 @@ def train(
         if not chosen:
             raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
         feeders[name] = Feeder(ExampleSet(stack, chosen, scaling), device, rules.workers)
-    state = _start(architecture, rules, device)
+    state = _start(architecture, scaling, rules, device)
     _resume(state, checkpoint, identity, device)
     for epoch in range(len(state.history), rules.epochs):
         started = time.perf_counter()
-        losses = _train_epoch(state, feeders["train"], rules, epoch)
+        losses = _train_epoch(state, feeders["train"], scaling, rules, epoch)
         held_out = feeders["validation"]
-        error = validation_error(state.generator, held_out.batches(range(len(held_out)), rules.batch_size))
+        batches = held_out.batches(range(len(held_out)), rules.batch_size)
+        error = validation_error(state.generator, scaling, batches)
         row = {"epoch": epoch, **losses, "validation_error": error}
         row["seconds"] = time.perf_counter() - started
         if not np.isfinite(list(row.values())).all():
@@ -176,18 +180,23 @@ def _prepare(rules: TrainingRules) -> torch.device:
     return torch.device(rules.device)
 
 
-def _start(architecture: Architecture, rules: TrainingRules, device: torch.device) -> _State:
+def _start(
+    architecture: Architecture, scaling: Scaling, rules: TrainingRules, device: torch.device
+) -> _State:
     torch.manual_seed(rules.seed)
-    generator, discriminator = Generator(architecture), Discriminator(architecture)
+    generator, discriminator = Generator(architecture, scaling), Discriminator(architecture)
     # Convolutions of a GPU's tensor cores want the channels together.
     layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
+    if architecture.network == "pix2pix":
+        initialise(generator)
+        initialise(discriminator)
     for network in (generator, discriminator):
-        initialise(network).to(device=device, memory_format=layout)  # type: ignore[call-overload]
+        network.to(device=device, memory_format=layout)  # type: ignore[call-overload]
     optimisers = [
         torch.optim.Adam(network.parameters(), rules.learning_rate, (rules.beta1, 0.999))
         for network in (generator, discriminator)
     ]
-    generate: Callable[[Tensor], Tensor] = _evaluated(generator, rules)
+    generate: Callable[[Tensor, Tensor], Tensor] = _evaluated(generator, rules)
     judge: Callable[[Tensor, Tensor], Tensor] = _evaluated(discriminator, rules)
     return _State(generator, discriminator, (optimisers[0], optimisers[1]), generate, judge, [], {})
 
@@ -219,7 +228,9 @@ def _resume(state: _State, checkpoint: Path, identity: str, device: torch.device
         log.info("resumed after epoch %d", len(state.history) - 1)
 
 
-def _train_epoch(state: _State, feeder: Feeder, rules: TrainingRules, epoch: int) -> dict[str, float]:
+def _train_epoch(
+    state: _State, feeder: Feeder, scaling: Scaling, rules: TrainingRules, epoch: int
+) -> dict[str, float]:
     """One pass over the examples in an order of the epoch's own; returns mean losses."""
     torch.manual_seed(int(np.random.SeedSequence([rules.seed, epoch]).generate_state(1)[0]))
     order = torch.randperm(len(feeder)).tolist()
@@ -232,7 +243,7 @@ def _train_epoch(state: _State, feeder: Feeder, rules: TrainingRules, epoch: int
     state.generator.train()
     state.discriminator.train()
     losses = [
-        _step(state, inputs, target, rules.lambda_l1)
+        _step(state, inputs, target, cells_of(target, scaling), rules)
         for inputs, target in feeder.batches(order, rules.batch_size)
     ]
     # Read once an epoch: a GPU need not wait for the processor at every step.
@@ -240,24 +251,32 @@ def _train_epoch(state: _State, feeder: Feeder, rules: TrainingRules, epoch: int
     return dict(zip(("generator_loss", "l1", "discriminator_loss"), means, strict=True))
 
 
-def _step(state: _State, inputs: Tensor, target: Tensor, lambda_l1: float) -> Tensor:
-    """One step of the discriminator, then one of the generator; returns their losses and L1, (3,)."""
-    prediction = state.generate(inputs)
-    state.optimisers[1].zero_grad(set_to_none=True)
-    judged = discriminator_loss(state.judge(inputs, target), state.judge(inputs, prediction.detach()))
-    judged.backward()  # type: ignore[no-untyped-call]
-    state.optimisers[1].step()
+def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:
+    """Numbers of cells (n,) that scaled fields (n, 8, y, x) hold: the sum of their density."""
+    return (fields[:, 0].double() * scaling.scale[0] + scaling.offset[0]).sum((1, 2)).float()
+
+
+def _step(state: _State, inputs: Tensor, target: Tensor, cells: Tensor, rules: TrainingRules) -> Tensor:
+    """One step of the discriminator, if any, then one of the generator; returns their losses and L1, (3,)."""
+    prediction = state.generate(inputs, cells)
+    judged = torch.zeros((), device=inputs.device)
+    if rules.adversarial:
+        state.optimisers[1].zero_grad(set_to_none=True)
+        judged = discriminator_loss(state.judge(inputs, target), state.judge(inputs, prediction.detach()))
+        judged.backward()  # type: ignore[no-untyped-call]
+        state.optimisers[1].step()
 
     state.optimisers[0].zero_grad(set_to_none=True)
     state.discriminator.requires_grad_(False)
-    loss = generator_loss(state.judge(inputs, prediction), prediction, target, lambda_l1)
+    opinion = state.judge(inputs, prediction) if rules.adversarial else None
+    loss = generator_loss(opinion, prediction, target, rules.lambda_l1, rules.adversarial)
     loss.total.backward()  # type: ignore[no-untyped-call]
     state.discriminator.requires_grad_(True)
     state.optimisers[0].step()
     return torch.stack([loss.total.detach(), loss.l1.detach(), judged.detach()]).double()
 
 
-def validation_error(generator: Generator, batches: Batches) -> float:
+def validation_error(generator: Generator, scaling: Scaling, batches: Batches) -> float:
     """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
 
     Error and variance are summed over the examples before they are divided: an example in which
@@ -267,7 +286,7 @@ def validation_error(generator: Generator, batches: Batches) -> float:
     error, variance = np.zeros(len(SCORED)), np.zeros(len(SCORED))
     with torch.no_grad():
         for inputs, target in batches:
-            predicted, wanted = generator(inputs)[:, SCORED], target[:, SCORED]
+            predicted, wanted = generator(inputs, cells_of(target, scaling))[:, SCORED], target[:, SCORED]
             error += (
                 ((predicted - wanted) ** 2).mean(dim=(2, 3), dtype=torch.float64).sum(dim=0).cpu().numpy()
             )
@@ -278,15 +297,16 @@ def validation_error(generator: Generator, batches: Batches) -> float:
 def samples_a_second(architecture: Architecture, rules: TrainingRules, steps: int = 3) -> float:
     """Examples a second that steps of training take, reading left out; for benchmarks."""
     device = _prepare(rules)
-    state = _start(architecture, rules, device)
+    scaling = Scaling((0.0,) * len(FIELDS), (1.0,) * len(FIELDS))
+    state = _start(architecture, scaling, rules, device)
     shape = (rules.batch_size, architecture.pixels, architecture.pixels)
     inputs = torch.randn(shape[0], len(INPUTS), *shape[1:], device=device)
-    target = torch.randn(shape[0], len(FIELDS), *shape[1:], device=device)
+    target = torch.rand(shape[0], len(FIELDS), *shape[1:], device=device)
     for _ in range(2):  # the first ones also plan and compile
-        _step(state, inputs, target, rules.lambda_l1).tolist()
+        _step(state, inputs, target, cells_of(target, scaling), rules).tolist()
     started = time.perf_counter()
     for _ in range(steps):
-        losses = _step(state, inputs, target, rules.lambda_l1)
+        losses = _step(state, inputs, target, cells_of(target, scaling), rules)
     losses.tolist()  # waits for a GPU to be done
     return steps * rules.batch_size / (time.perf_counter() - started)
 

@@ -1,0 +1,107 @@
+"""What every tissue obeys, put into predictions by construction or by projection.
+
+Density is nowhere negative, nowhere deeper than 5 sigma in a wall, and sums to the number of cells; the
+orientation tensor (sums of s s^T over a pixel's cells) is positive semi-definite, and its trace is the
+density. The sign of (sxsz, sysz) is spontaneous: an average speaks of magnitudes alone.
+"""
+
+import math
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import conv2d, softplus
+
+from raptor.dataset.scaling import Scaling
+from raptor.fields import SIGMA
+from raptor.moulds.raster import pixel_size
+from raptor.symmetry import FIELDS
+
+REACH = 5 * SIGMA  # l0; no density lies deeper in a wall
+SMALL = 1e-12
+ROUNDING = 1e-5
+XX, YY, ZZ, XY, XZ, YZ = (FIELDS.index(name) for name in ("sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz"))
+
+
+def reachable(depression: Tensor) -> Tensor:
+    """Where density may be, (n, 1, y, x) of 0 and 1: within 5 sigma, and a pixel, of the depression's."""
+    size = pixel_size(depression.shape[-1])
+    reach = REACH + size
+    radius = math.ceil(reach / size)
+    steps = torch.arange(-radius, radius + 1, device=depression.device) * size
+    disc = (steps[:, None] ** 2 + steps**2 <= reach**2).to(depression.dtype)
+    return (conv2d(depression, disc[None, None], padding=radius) > 0.5).to(depression.dtype)
+
+
+class PhysicalFields(nn.Module):
+    """Turns eight free channels into scaled fields that obey the physics.
+
+    Density is softplus of the first channel, where it may be, scaled to the number of cells. The tensor is
+    density L L^T / tr(L L^T) with L a lower triangle made of the last six channels. Tension is free where
+    density may be.
+    """
+
+    offset: Tensor
+    scale: Tensor
+    isotropic: Tensor
+
+    def __init__(self, scaling: Scaling) -> None:
+        super().__init__()
+        self.register_buffer("offset", torch.tensor(scaling.offset)[:, None, None])
+        self.register_buffer("scale", torch.tensor(scaling.scale)[:, None, None])
+        self.register_buffer("isotropic", torch.tensor([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None, None])
+
+    def forward(self, free: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+        """Scaled fields (n, 8, y, x) from free channels, masks (n, 1, y, x) of 0 and 1, and cells (n,)."""
+        there = reachable(depression)
+        density = softplus(free[:, :1]) * there
+        density = density * (cells[:, None, None, None] / density.sum((2, 3), keepdim=True))
+        a, b, c, d, e, f = torch.split(free[:, 2:] + self.isotropic, 1, dim=1)
+        parts = [a * a, b * b + c * c, d * d + e * e + f * f, a * b, a * d, b * d + c * e]
+        each = density / (parts[0] + parts[1] + parts[2] + SMALL)
+        tension = free[:, 1:2] * self.scale[1] * there
+        fields = torch.cat([density, tension, *(each * part for part in parts)], dim=1)
+        return (fields - self.offset) / self.scale
+
+
+def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+    """Fields (n, 8, y, x) in physical units made to obey the physics, for networks that do not by themselves.
+
+    Negative density and density out of reach are dropped and the rest scaled to the cells; negative
+    eigenvalues of the tensor are dropped and its trace scaled to the density.
+    """
+    there = reachable(depression)
+    density = fields[:, :1].clamp(min=0.0) * there
+    density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
+    rows = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
+    tensor = torch.stack([torch.stack([fields[:, k] for k in row], dim=-1) for row in rows], dim=-2)
+    values, vectors = torch.linalg.eigh(tensor)
+    values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
+    values = values * (density[:, 0, :, :, None] / values.sum(-1, keepdim=True))
+    tensor = (vectors * values[..., None, :]) @ vectors.transpose(-1, -2)
+    parts = [tensor[..., i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return torch.cat([density, fields[:, 1:2] * there, torch.stack(parts, dim=1)], dim=1)
+
+
+def average(fields: Tensor) -> Tensor:
+    """Mean (8, y, x) of predictions (n, 8, y, x) of one tissue, in physical units.
+
+    All fields are linear but (sxsz, sysz), whose signs mean nothing: of them magnitudes are averaged, which
+    D4 moves like any image, shortened where the tensor would not stay positive; sxsz is then positive, and
+    sysz has the sign of sxsy. What obeys the physics before does so after.
+    """
+    mean = fields.mean(0)
+    x, y = fields[:, XZ].abs().mean(0), fields[:, YZ].abs().mean(0)
+    y = torch.where(mean[XY] < 0, -y, y)
+    # v v^T <= szz A with A the tensor in the plane, or v^T adj(A) v <= szz det(A).
+    a, b, c = mean[XX], mean[XY], mean[YY]
+    # A tensor of few directions has next to no determinant, and rounding must not decide.
+    room = mean[ZZ] * ((a * c - b * b).clamp(min=0.0) + ROUNDING * a * c)
+    taken = c * x * x - 2 * b * x * y + a * y * y
+    short = torch.where(taken > room, torch.sqrt(room / taken.clamp(min=SMALL)), 1.0)
+    mean[XZ], mean[YZ] = x * short, y * short
+    return mean
+
+
+def unsigned(fields: Tensor) -> Tensor:
+    """Fields (..., 8, y, x) with sxsz and sysz by magnitude, for losses and errors."""
+    return torch.cat([fields[..., :XZ, :, :], fields[..., XZ:, :, :].abs()], dim=-3)

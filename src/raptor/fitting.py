@@ -95,8 +95,8 @@ def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
 def surrogate_measure(surrogate: Surrogate, mould: Mould) -> Measure:
     """Area and width ratio of a mould's tissue as the surrogate predicts them, from one image for speed."""
     cells = len(cast_sites(mould, surrogate.layers))
-    image = mould_image(mould, surrogate.architecture.pixels)
-    threshold = density_threshold(surrogate.layers, surrogate.architecture.pixels)
+    image = mould_image(mould, surrogate.pixels)
+    threshold = density_threshold(surrogate.layers, surrogate.pixels)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         fields = surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=False)

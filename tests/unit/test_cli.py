@@ -116,7 +116,7 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     architecture = Architecture(32, 4)
     scaling = Scaling((0.5,) * 8, (0.5,) * 8)
     weights = initialise(Generator(architecture, scaling)).state_dict()
-    save(tmp_path, weights, architecture, scaling, 4, {}, "x")
+    save(tmp_path, weights, architecture, scaling, 4, 32, {}, "x")
     output = tmp_path / "prediction.nc"
     done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
     assert done.returncode == 0, done.stderr

@@ -6,8 +6,10 @@ import shapely
 import torch
 
 from raptor.dataset.scaling import Scaling
+from raptor.fields import rasterise
 from raptor.moulds import Circle, Mould, mould_image
 from raptor.parameters import CellParameters
+from raptor.resolution import pooled, refined
 from raptor.surrogate import physics
 from raptor.surrogate.feeding import apply
 from raptor.surrogate.inference import Surrogate
@@ -81,14 +83,15 @@ def test_an_average_obeys_it_and_keeps_what_does_not_change():
     assert (both - alike).abs().max() < 1e-5 * fields[0].abs().max()
 
 
+@pytest.mark.parametrize("seen", [PIXELS, PIXELS // 2])
 @pytest.mark.parametrize("network", ["pix2pix", "compact"])
-def test_the_prediction_of_a_turned_mould_is_the_turned_prediction(network):
+def test_the_prediction_of_a_turned_mould_is_the_turned_prediction(network, seen):
     torch.manual_seed(0)
-    architecture = Architecture(PIXELS, 8, network=network)
+    architecture = Architecture(seen, 8, network=network)
     generator = Generator(architecture, SCALING)
     if network == "pix2pix":
         initialise(generator)
-    surrogate = Surrogate(generator.eval(), architecture, SCALING, 2)
+    surrogate = Surrogate(generator.eval(), architecture, SCALING, 2, PIXELS)
     image = mould_image(MOULD, PIXELS)
     plain = surrogate.predict(image.depression, image.tethers, [PARAMETERS], CELLS)[0]
     require_physical(torch.from_numpy(plain)[None], small=1e-4)
@@ -98,3 +101,17 @@ def test_the_prediction_of_a_turned_mould_is_the_turned_prediction(network):
         found = surrogate.predict(masks.depression, masks.tethers, [PARAMETERS], CELLS)[0]
         wanted = physics.unsigned(apply(torch.from_numpy(plain), element))
         assert (physics.unsigned(torch.from_numpy(found)) - wanted).abs().max() < 1e-5 * wanted.abs().max()
+
+
+def test_a_coarse_image_of_a_tissue_holds_the_fine_one():
+    rng = np.random.default_rng(0)
+    positions = rng.uniform((-12, -8, 0), (10, 9, 3), (400, 3))
+    orientation = rng.normal(size=(400, 3))
+    orientation /= np.linalg.norm(orientation, axis=1)[:, None]
+    cells = (positions, orientation, rng.normal(size=400))
+    fine, coarse = (torch.from_numpy(rasterise(*cells, pixels)) for pixels in (256, 128))
+    assert (4 * pooled(fine, 128) - coarse).abs().max() < 1e-7 * coarse.abs().max()  # sums over squares
+    for pixels, least in ((128, 1e-5), (64, 0.05)):
+        again = refined(pooled(fine, pixels), 256)
+        assert (again - fine).abs().max() < least * fine.abs().max()
+    assert refined(fine, 256) is fine

@@ -151,7 +151,7 @@ def test_a_checkpoint_of_another_training_or_cut_short_is_ignored(training, tmp_
 def model_folder(tmp_path):
     architecture = Architecture(32, 4)
     generator = initialise(Generator(architecture, SCALING))
-    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, {}, "a")
+    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, architecture.pixels, {}, "a")
     return tmp_path / "model"
 
 

@@ -24,7 +24,7 @@ with logged(snakemake.log[0]):
     fitted = fit(surrogate_measure(surrogate, mould), target, starts=params.starts, seed=seed)
     model = NetworkModel(params.model["layers"], tuple(params.model["shells"]), params.model["tension"])
     simulation = simulate(mould, fitted.parameters, model, params.accuracy, seed)
-    measured = measure_simulation(simulation, mould, model, surrogate.architecture.pixels, target)
+    measured = measure_simulation(simulation, mould, model, surrogate.pixels, target)
     run = Run(0, mould.name, "test", False, fitted.parameters, seed)
     write_shard(
         Path(snakemake.output.tissue),

@@ -16,7 +16,7 @@ with logged(snakemake.log[0]):
     mould = read_mould(Path(snakemake.input.mould)).scaled(fit["mould_scale"])
     (record,) = read_shard(Path(snakemake.input.tissue)).records
     surrogate = load(Path(snakemake.input.weights).parent)
-    pixels = surrogate.architecture.pixels
+    pixels = surrogate.pixels
     stacks = {
         "prediction": surrogate.predict_mould(mould, record.parameters),
         "simulation": record_fields(record, pixels),

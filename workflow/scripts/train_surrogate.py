@@ -17,7 +17,7 @@ with logged(snakemake.log[0]):
     table = read_table(stack)
     scaling = read_scaling(Path(snakemake.input.normalisation))
     sizes = {name: given[name] for name in ("base_channels", "dropout", "patch_layers", "network")}
-    architecture = Architecture(table.pixels, **sizes)
+    architecture = Architecture(given["pixels"] or table.pixels, **sizes)
     names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers")
     names += ("precision", "compiled", "deterministic", "adversarial")
     rules = TrainingRules(
@@ -47,6 +47,7 @@ with logged(snakemake.log[0]):
         architecture,
         scaling,
         snakemake.params.layers,
+        table.pixels,
         describe(architecture, rules),
         identity,
     )

@@ -148,6 +148,9 @@ class Surrogate(Block):
     adversarial: float = Field(
         1.0, ge=0, description="weight of the discriminator's judgement; 0 trains without one"
     )
+    pixels: Literal[16, 32, 64, 128, 256] | None = Field(
+        None, description="side of the images that the network sees, means of fields.pixels; null: those"
+    )
     base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
     dropout: float = Field(0.5, ge=0, lt=1, description="in the three deepest decoder layers")
     patch_layers: int = Field(3, ge=1, le=5, description="strided layers of the discriminator")

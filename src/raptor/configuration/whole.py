@@ -58,6 +58,11 @@ class Configuration(Block):
                 "device is cuda, where simulations are contracted at draft or standard; for accuracy: "
                 "reference choose device: auto or cpu"
             )
+        if self.surrogate.pixels is not None and self.surrogate.pixels > self.fields.pixels:
+            raise ValueError(
+                f"surrogate.pixels is {self.surrogate.pixels}, more than fields.pixels "
+                f"({self.fields.pixels}); lower it, or leave it out"
+            )
         for pixels in self.tradeoff.pixels:
             if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
                 raise ValueError(

@@ -2,17 +2,16 @@
 
 import os
 from pathlib import Path
-from typing import Any
 
 import h5py
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
 from raptor.dataset.examples import Example
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.dataset.stack import read_table
+from raptor.resolution import pooled
 from raptor.symmetry import Element, apply, move_pixels
 
 
@@ -28,11 +27,15 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
         Where the stack cannot be read.
     """
 
-    def __init__(self, stack: Path, examples: list[Example], scaling: Scaling) -> None:
+    def __init__(
+        self, stack: Path, examples: list[Example], scaling: Scaling, pixels: int | None = None
+    ) -> None:
+        table = read_table(stack)
         self.stack = Path(stack)
         self.examples = examples
         self.scaling = scaling
-        self.parameters = read_table(stack).parameters
+        self.pixels = pixels or table.pixels
+        self.parameters = table.parameters
         self._file: h5py.File | None = None
         self._reader = 0
 
@@ -45,15 +48,15 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
             self._file, self._reader = h5py.File(self.stack, "r"), os.getpid()
         return self._file
 
-    def sample(self, row: int, element: Element | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
+    def sample(self, row: int, element: Element | None = None) -> tuple[Tensor, Tensor]:
         """Scaled inputs (5, y, x) and targets (8, y, x) of a row of the stack, moved by an element of D4."""
         element = element or Element(0, mirror=False)
         file = self._open()
         depression, tethers = (move_pixels(file[name][row], element) for name in ("depression", "tethers"))
         inputs = scale_inputs(depression, tethers, self.parameters[row])
-        return inputs, self.scaling.forward(apply(file["fields"][row], element))
+        target = self.scaling.forward(apply(file["fields"][row], element))
+        return pooled(torch.from_numpy(inputs), self.pixels), pooled(torch.from_numpy(target), self.pixels)
 
     def __getitem__(self, number: int) -> tuple[Tensor, Tensor]:
         example = self.examples[number]
-        inputs, target = self.sample(example.sample, Element.from_index(example.element))
-        return torch.from_numpy(inputs), torch.from_numpy(target)
+        return self.sample(example.sample, Element.from_index(example.element))

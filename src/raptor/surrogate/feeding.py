@@ -56,7 +56,7 @@ class Feeder:
         pairs = [self.dataset.sample(row) for row in self.rows]
         self.place = {row: number for number, row in enumerate(self.rows)}
         self.inputs, self.targets = (
-            torch.stack([torch.from_numpy(pair[part]) for pair in pairs]).to(self.device) for part in (0, 1)
+            torch.stack([pair[part] for pair in pairs]).to(self.device) for part in (0, 1)
         )
 
     def batches(self, order: Sequence[int], size: int) -> Batches:

@@ -23,6 +23,7 @@ from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image, pixel_centres
 from raptor.parameters import CellParameters
+from raptor.resolution import pooled, refined
 from raptor.surrogate.feeding import apply
 from raptor.surrogate.networks import Architecture, Generator
 from raptor.surrogate.physics import average, project
@@ -33,12 +34,16 @@ BATCH = 16
 
 @dataclass(frozen=True)
 class Surrogate:
-    """A trained generator with what is needed to use it without its data set."""
+    """A trained generator with what is needed to use it without its data set.
+
+    `pixels` is the side of the images that it predicts, of which the network may see means over squares.
+    """
 
     generator: Generator
     architecture: Architecture
     scaling: Scaling
     layers: int
+    pixels: int
 
     def predict(
         self,
@@ -64,7 +69,7 @@ class Surrogate:
         RaptorError
             Where the masks have another size than the network, or parameters are out of its range.
         """
-        pixels = self.architecture.pixels
+        pixels = self.pixels
         if depression.shape != (pixels, pixels):
             raise RaptorError(f"masks are {depression.shape}; this model takes {pixels} x {pixels} pixels")
         for values in parameters:
@@ -80,23 +85,23 @@ class Surrogate:
         self.generator.eval()
         with torch.no_grad():
             parts = [
-                self._physical(torch.from_numpy(np.stack(images[start : start + BATCH])), cells)
+                self._evaluated(torch.from_numpy(np.stack(images[start : start + BATCH])), cells)
                 for start in range(0, len(images), BATCH)
             ]
-            fields = torch.cat(parts).reshape(len(parameters), len(elements), len(FIELDS), pixels, pixels)
-            if averaged:
-                fields = torch.stack([_averaged(of_one, elements) for of_one in fields])
-            else:
-                fields = fields[:, 0]
+            of_each = torch.split(torch.cat(parts), len(elements))
+            fields = torch.stack([_averaged(part, elements) if averaged else part[0] for part in of_each])
+            if self.generator.physical is None or self.architecture.pixels < pixels:
+                masks = torch.from_numpy(depression.astype(np.float32)).expand(len(fields), 1, -1, -1)
+                fields = project(fields, masks, torch.full((len(fields),), float(cells)))
         return np.asarray(fields.numpy(), dtype=np.float32)
 
-    def _physical(self, inputs: Tensor, cells: int) -> Tensor:
-        """Fields in physical units that obey the physics, for scaled inputs."""
-        counts = torch.full((len(inputs),), float(cells))
-        fields = torch.from_numpy(self.scaling.inverse(self.generator(inputs, counts).numpy()))
-        if self.generator.physical is not None:
-            return fields
-        return project(fields, 0.5 * (inputs[:, :1] + 1), counts)
+    def _evaluated(self, inputs: Tensor, cells: int) -> Tensor:
+        """Fields in physical units, for scaled inputs, as the network gives them."""
+        seen = self.architecture.pixels
+        # Fields are in the unit of a fine pixel, of which a coarse one is the mean.
+        counts = torch.full((len(inputs),), cells * (seen / self.pixels) ** 2)
+        scaled = self.generator(pooled(inputs, seen), counts)
+        return torch.from_numpy(self.scaling.inverse(refined(scaled, self.pixels).numpy()))
 
     def predict_mould(
         self, mould: Mould, parameters: CellParameters, *, averaged: bool = True
@@ -108,7 +113,7 @@ class Surrogate:
         RaptorError
             As `predict`, and where the mould holds no cell.
         """
-        image = mould_image(mould, self.architecture.pixels)
+        image = mould_image(mould, self.pixels)
         cells = len(cast_sites(mould, self.layers))
         fields = self.predict(image.depression, image.tethers, [parameters], cells, averaged=averaged)
         return np.asarray(fields[0])
@@ -126,6 +131,7 @@ def save(
     architecture: Architecture,
     scaling: Scaling,
     layers: int,
+    pixels: int,
     description: dict[str, Any],
     identity: str,
 ) -> None:
@@ -142,6 +148,7 @@ def save(
         "architecture": architecture.as_json(),
         "normalisation": scaling.as_json(),
         "layers": layers,
+        "pixels": pixels,
         "model_version": MODEL_VERSION,
     }
     with atomic_path(folder / "model.json") as temporary:
@@ -160,7 +167,8 @@ def load(folder: Path) -> Surrogate:
     try:
         content = json.loads((folder / "model.json").read_text())
         architecture = Architecture(**content["architecture"])
-        scaling, layers = Scaling.from_json(content["normalisation"]), int(content["layers"])
+        scaling = Scaling.from_json(content["normalisation"])
+        layers, pixels = int(content["layers"]), int(content["pixels"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / 'model.json'} cannot be read: {error}") from error
     generator = Generator(architecture, scaling)
@@ -179,7 +187,7 @@ def load(folder: Path) -> Surrogate:
             f"keep the two files of one training together ({str(error).splitlines()[0]})"
         ) from error
     generator.eval()
-    return Surrogate(generator, architecture, scaling, layers)
+    return Surrogate(generator, architecture, scaling, layers, pixels)
 
 
 def write_prediction(

@@ -72,14 +72,19 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     there = reachable(depression)
     density = fields[:, :1].clamp(min=0.0) * there
     density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
+    image, y, x = torch.nonzero(density[:, 0], as_tuple=True)  # the tensor is zero elsewhere
+    found = fields[image, :, y, x]
     rows = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
-    tensor = torch.stack([torch.stack([fields[:, k] for k in row], dim=-1) for row in rows], dim=-2)
-    values, vectors = torch.linalg.eigh(tensor)
+    tensor = found[:, rows].double()
+    size = tensor.abs().amax((1, 2), keepdim=True).clamp(min=SMALL)  # tiny ones would not converge
+    values, vectors = torch.linalg.eigh(tensor / size)
     values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
-    values = values * (density[:, 0, :, :, None] / values.sum(-1, keepdim=True))
-    tensor = (vectors * values[..., None, :]) @ vectors.transpose(-1, -2)
-    parts = [tensor[..., i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    return torch.cat([density, fields[:, 1:2] * there, torch.stack(parts, dim=1)], dim=1)
+    values = values * (density[image, 0, y, x] / values.sum(1))[:, None]
+    tensor = ((vectors * values[:, None, :]) @ vectors.transpose(1, 2)).to(fields.dtype)
+    obeying = torch.cat([density, fields[:, 1:2] * there, torch.zeros_like(fields[:, 2:])], dim=1)
+    for channel, (i, j) in {XX: (0, 0), YY: (1, 1), ZZ: (2, 2), XY: (0, 1), XZ: (0, 2), YZ: (1, 2)}.items():
+        obeying[image, channel, y, x] = tensor[:, i, j]
+    return obeying
 
 
 def average(fields: Tensor) -> Tensor:
@@ -95,7 +100,7 @@ def average(fields: Tensor) -> Tensor:
     # v v^T <= szz A with A the tensor in the plane, or v^T adj(A) v <= szz det(A).
     a, b, c = mean[XX], mean[XY], mean[YY]
     # A tensor of few directions has next to no determinant, and rounding must not decide.
-    room = mean[ZZ] * ((a * c - b * b).clamp(min=0.0) + ROUNDING * a * c)
+    room = mean[ZZ].clamp(min=0.0) * ((a * c - b * b).clamp(min=0.0) + ROUNDING * (a * c).abs())
     taken = c * x * x - 2 * b * x * y + a * y * y
     short = torch.where(taken > room, torch.sqrt(room / taken.clamp(min=SMALL)), 1.0)
     mean[XZ], mean[YZ] = x * short, y * short

@@ -145,7 +145,8 @@ def train(
         chosen = [example for example in examples if splits[example.sample] == name]
         if not chosen:
             raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
-        feeders[name] = Feeder(ExampleSet(stack, chosen, scaling), device, rules.workers)
+        dataset = ExampleSet(stack, chosen, scaling, architecture.pixels)
+        feeders[name] = Feeder(dataset, device, rules.workers)
     state = _start(architecture, scaling, rules, device)
     _resume(state, checkpoint, identity, device)
     for epoch in range(len(state.history), rules.epochs):

@@ -130,7 +130,9 @@ def truncate_shard(trial: Trial, moment: random.Random) -> str:
 
 def main(folder: Path) -> int:
     """Run all trials; returns the number of those that did not end in the same data."""
-    moment = random.Random()
+    seed = random.SystemRandom().randrange(10**6) if len(sys.argv) < 3 else int(sys.argv[2])
+    sys.stdout.write(f"moments of seed {seed}\n")
+    moment = random.Random(seed)
     plain = Trial(folder / "undisturbed")
     started = time.monotonic()
     if plain.finish():
@@ -162,6 +164,6 @@ def main(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m tests.endurance FOLDER")
+    if len(sys.argv) not in (2, 3):
+        sys.exit("usage: python -m tests.endurance FOLDER [SEED]")
     sys.exit(main(Path(sys.argv[1]).absolute()))

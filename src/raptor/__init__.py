@@ -14,3 +14,6 @@ __version__ = version("raptor-tissue")
 
 MODEL_VERSION = 2
 """Raised whenever a change of code changes results: it travels in rule parameters and in files."""
+
+STACK_FORMAT = 2
+"""Raised whenever field stacks are laid out otherwise: they are then built again, from the same shards."""

@@ -8,8 +8,11 @@ from raptor.errors import RaptorError
 Device = Literal["auto", "cpu", "cuda"]
 
 
-def chosen_device(name: str) -> str:
+def chosen_device(name: str, gpus: int = 1) -> str:
     """Turn auto, cpu or cuda into cpu or cuda; torch is imported only where there may be a GPU.
+
+    `gpus` is how many a job was given: with none, auto is the processor, whatever the machine has, so that
+    jobs side by side do not all take the same GPU, or some of them one and others none.
 
     Raises
     ------
@@ -18,7 +21,7 @@ def chosen_device(name: str) -> str:
     """
     if name not in get_args(Device):
         raise RaptorError(f"device is '{name}'; allowed are {', '.join(get_args(Device))}")
-    if name == "cpu" or (name == "auto" and shutil.which("nvidia-smi") is None):
+    if name == "cpu" or (name == "auto" and (gpus == 0 or shutil.which("nvidia-smi") is None)):
         return "cpu"
     import torch
 

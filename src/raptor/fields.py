@@ -18,6 +18,9 @@ from raptor.symmetry import FIELDS
 SIGMA = 3 * 125 / 512
 """Width of the Gaussian, l0 (3 pixels of the paper's 256-pixel image)."""
 
+DEEP = 5 * SIGMA
+"""How deep in a wall density may lie, l0; none lies deeper."""
+
 REACH = 6.0  # in sigma: beyond it lies 2e-9 of a cell
 
 

@@ -98,6 +98,7 @@ def test_a_gpu_is_not_made_up(monkeypatch):
 
     from raptor.device import chosen_device
 
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert chosen_device("cpu") == chosen_device("auto") == "cpu"
     with pytest.raises(RaptorError, match=r"sees no GPU; choose device: auto or cpu"):
@@ -105,7 +106,10 @@ def test_a_gpu_is_not_made_up(monkeypatch):
     with pytest.raises(RaptorError, match="allowed are auto, cpu, cuda"):
         chosen_device("gpu")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    assert chosen_device("cuda") == "cuda"
+    assert chosen_device("cuda") == chosen_device("auto") == "cuda"
+    assert chosen_device("auto", gpus=0) == "cpu"  # a job that was given none
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    assert chosen_device("auto") == "cpu"
 
 
 def test_a_gpu_contracts_at_draft_and_standard_only():

@@ -246,6 +246,25 @@ def test_a_split_without_simulations_stops_the_data_set(tmp_path, monkeypatch):
         build(tmp_path / "unit", 6)
 
 
+def test_shards_of_two_devices_are_not_put_together(made, tmp_path):
+    shutil.copytree(made, tmp_path / "unit")
+    shards_made = sorted((tmp_path / "unit" / "simulations").glob("*.nc"))
+    with netCDF4.Dataset(shards_made[-1], "a") as file:
+        file.device = "cuda"
+    runs = read_design(made / "design" / "design.csv")
+    moulds = {mould.name: mould for mould in read_moulds(made / "design" / "moulds.geojson")}
+    with pytest.raises(RaptorError, match="made on another device than those before it"):
+        build_stack(
+            tmp_path / "stack.nc",
+            shards_made,
+            runs,
+            moulds,
+            32,
+            simulation_configuration="c",
+            configuration="d",
+        )
+
+
 def test_the_wells_layout_holds_the_same_fields(made, tmp_path):
     stack = made / "dataset" / "fields.nc"
     table = read_table(stack)

@@ -52,7 +52,7 @@ def test_reach_is_five_sigma_and_covers_thin_posts():
     there = physics.reachable(depression())[0, 0]
     x = (torch.arange(PIXELS) + 0.5) * 62.5 / PIXELS - 31.25
     row = there[PIXELS // 2]
-    assert float(x[row > 0].min()) == pytest.approx(-9 - physics.REACH, abs=62.5 / PIXELS)
+    assert float(x[row > 0].min()) == pytest.approx(-9 - physics.DEEP, abs=62.5 / PIXELS)
     assert (there >= depression()[0, 0]).all()
 
 

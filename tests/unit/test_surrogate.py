@@ -96,7 +96,7 @@ def test_training_in_bfloat16_keeps_float32_weights(training_rules, made, tmp_pa
 def test_examples_kept_on_a_device_are_the_loaders(made):
     stack = made / "dataset" / "fields.nc"
     examples = ExampleSet(stack, augment(stack), training_scaling(stack))
-    kept, read = (Feeder(examples, torch.device("cpu"), resident=resident) for resident in (True, False))
+    kept, read = (Feeder(examples, torch.device("cpu"), 0, resident) for resident in (True, False))
     order = torch.randperm(len(examples)).tolist()
     batches = list(zip(kept.batches(order, 5), read.batches(order, 5), strict=True))
     assert sum(len(inputs) for (inputs, _), _ in batches) == len(examples)

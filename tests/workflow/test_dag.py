@@ -80,7 +80,7 @@ def test_targets_make_their_part(workplace):
     assert place.jobs("report") == EVERYTHING - {"all"}
 
 
-def test_a_gpu_s_profile_gives_it_to_one_job_at_a_time(workplace):
+def test_a_gpu_s_profile_asks_for_it_where_it_is_used(workplace):
     place = workplace("gpu")
     profile = str(ROOT / "workflow" / "profiles" / "gpu")
     done = place.run("--dry-run", "--cores", "4", "--workflow-profile", profile, "dataset")

@@ -20,7 +20,7 @@ rule compile_kernels:
 
 
 rule simulate_shard:
-    """Simulate some runs of the design, one after another, into one file."""
+    """Simulate some runs of the design into one file."""
     input:
         design=rules.sample_design.output.design,
         moulds=rules.sample_design.output.moulds,

@@ -2,7 +2,7 @@
 
 
 rule train_surrogate:
-    """Train pix2pix; goes on from its checkpoint after an interruption."""
+    """Train the surrogate; goes on from its checkpoint after an interruption."""
     input:
         stack=rules.build_stack.output.stack,
         examples=rules.augment_dataset.output.examples,

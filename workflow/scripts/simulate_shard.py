@@ -16,13 +16,14 @@ with logged(snakemake.log[0]):
     moulds = moulds_by_id(Path(snakemake.input.moulds), {run.mould for run in runs})
     params = snakemake.params
     model = NetworkModel(params.layers, tuple(params.shells), params.tension)
+    device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
     with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:
         simulations, failures = simulate_shard(
             runs,
             moulds,
             model,
             params.accuracy,
-            chosen_device(snakemake.config["device"]),
+            device,
             lambda run, outcome: done(f"{run.simulation}: {outcome}"),
         )
     write_shard(
@@ -33,4 +34,5 @@ with logged(snakemake.log[0]):
         params.accuracy,
         params.configuration,
         failures,
+        device,
     )

@@ -9,23 +9,16 @@ from raptor.dataset.stack import read_table
 from raptor.device import chosen_device
 from raptor.jobs import logged, progress
 from raptor.surrogate.inference import save
-from raptor.surrogate.networks import Architecture
-from raptor.surrogate.training import TrainingRules, describe, train, write_history
+from raptor.surrogate.networks import architecture_of
+from raptor.surrogate.training import describe, rules_of, train, write_history
 
 with logged(snakemake.log[0]):
     given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
     table = read_table(stack)
     scaling = read_scaling(Path(snakemake.input.normalisation))
-    sizes = {name: given[name] for name in ("base_channels", "dropout", "patch_layers", "network")}
-    architecture = Architecture(given["pixels"] or table.pixels, **sizes)
-    names = ("epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers")
-    names += ("precision", "compiled", "deterministic", "adversarial")
-    rules = TrainingRules(
-        **{name: given[name] for name in names},
-        seed=snakemake.params.seed % 2**63,
-        threads=snakemake.threads,
-        device=chosen_device(snakemake.config["device"]),
-    )
+    architecture = architecture_of(given, table.pixels)
+    device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
+    rules = rules_of(given, snakemake.params.seed, snakemake.threads, device)
     # A checkpoint goes on only if configuration and data are those that it was made from.
     files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]
     identity = content_hash([snakemake.params.identity, *files])

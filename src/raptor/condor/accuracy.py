@@ -47,6 +47,11 @@ class Accuracy:
     minimised: bool = True
     precision: str = "float64"
 
+    @property
+    def contracts_alone(self) -> bool:
+        """Whether it neither anneals nor goes on in rounds: what batches of tissues can do."""
+        return not (self.anneal_sweeps or self.rounds)
+
 
 ACCURACIES: dict[str, Accuracy] = {
     # Largest gradient left, over Delta: 0.03, 0.02, 0.001 kappa0 l0.

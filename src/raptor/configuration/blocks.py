@@ -145,14 +145,16 @@ class Surrogate(Block):
     network: Literal["pix2pix", "compact"] = Field(
         "pix2pix", description="the published U-Net, or a compact one whose fields obey the physics"
     )
-    adversarial: float = Field(
-        1.0, ge=0, description="weight of the discriminator's judgement; 0 trains without one"
+    adversarial: float | None = Field(
+        None,
+        ge=0,
+        description="weight of the discriminator's judgement, 0 without one; null: 1, or 0 for compact",
     )
     pixels: Literal[16, 32, 64, 128, 256] | None = Field(
         None, description="side of the images that the network sees, means of fields.pixels; null: those"
     )
     base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
-    dropout: float = Field(0.5, ge=0, lt=1, description="in the three deepest decoder layers")
+    dropout: float = Field(0.5, ge=0, lt=1, description="in the three deepest decoder layers of pix2pix")
     patch_layers: int = Field(3, ge=1, le=5, description="strided layers of the discriminator")
     epochs: Positive = Field(70, description="passes over the augmented examples")
     batch_size: int = Field(4, ge=2, description="examples a step")

@@ -6,7 +6,8 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from raptor import MODEL_VERSION
+from raptor import MODEL_VERSION, STACK_FORMAT
+from raptor.condor.accuracy import accuracy_named
 from raptor.configuration.blocks import (
     Block,
     Dataset,
@@ -33,7 +34,9 @@ class Configuration(Block):
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
     device: Device = Field(
-        "auto", description="where simulations, images and the surrogate are made; auto: a GPU if one is seen"
+        "auto",
+        description="where simulations and images are made and networks trained; auto: on a GPU where a "
+        "job is given one (profiles gpu and slurm) and sees it",
     )
     design: Design = Field(default_factory=lambda: Design())
     moulds: Moulds = Field(default_factory=lambda: Moulds())
@@ -53,10 +56,10 @@ class Configuration(Block):
                 f"moulds.cells allows {self.moulds.cells[1]} cells, more than {self.model.layers} "
                 f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise model.layers"
             )
-        if self.device == "cuda" and self.simulation.accuracy == "reference":
+        if self.device == "cuda" and not accuracy_named(self.simulation.accuracy).contracts_alone:
             raise ValueError(
                 "device is cuda, where simulations are contracted at draft or standard; for accuracy: "
-                "reference choose device: auto or cpu"
+                f"{self.simulation.accuracy} choose device: auto or cpu"
             )
         if self.surrogate.pixels is not None and self.surrogate.pixels > self.fields.pixels:
             raise ValueError(
@@ -121,7 +124,7 @@ class Configuration(Block):
         dump = self.model_dump(mode="json")
         design = [self.seed, dump["design"], dump["moulds"], self.model.layers, MODEL_VERSION]
         simulation = [design, dump["model"], self.simulation.accuracy]
-        dataset = [simulation, dump["fields"]]
+        dataset = [simulation, dump["fields"], STACK_FORMAT]
         surrogate = [dataset, self.surrogate.model_dump(mode="json", exclude={"workers"})]
         stages = {
             "design": design,

@@ -51,8 +51,8 @@ outline are walls that cells cannot enter; the gel is free between floor and fil
 accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 
 ## Cost
-{hours:.3f} core-hours in all; {median:.2f} s a simulation in the median, {p95:.2f} s at the 95th
-percentile, on one core of {machine}. Not converged: {unconverged} of {simulations}. Folded bonds: at
+{hours:.3f} {unit} in all; {median:.2f} s a simulation in the median, {p95:.2f} s at the 95th
+percentile, {where}. Not converged: {unconverged} of {simulations}. Folded bonds: at
 most {folded:.1e} of a tissue's. Simulations of the design that failed and are missing: {missing}.
 
 ## How to evaluate another simulator against it
@@ -105,7 +105,10 @@ def card(
         hours=sum(times) / 3600,
         median=np.median(times),
         p95=np.percentile(times, 95),
-        machine=f"{platform.machine()} with {os.cpu_count()} cores",
+        unit="core-hours" if shard.device == "cpu" else "hours of a GPU",
+        where=f"on one core of {platform.machine()} with {os.cpu_count()} cores"
+        if shard.device == "cpu"
+        else "each a share, by evaluations and cells, of a batch's time on the GPU",
         unconverged=unconverged,
         missing="; ".join(f"{n} ({reason})" for n, reason in sorted(failures.items())) or "none",
         folded=folded,

@@ -21,14 +21,13 @@ from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
 from raptor.errors import RaptorError
-from raptor.fields import SIGMA
+from raptor.fields import DEEP
 from raptor.moulds.geojson import moulds_by_id, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image, pixel_size
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32
-DEEP = 5 * SIGMA  # l0; no density lies deeper in a wall
 WALL_YIELD = 0.1  # l0; how far a soft wall gives way
 
 

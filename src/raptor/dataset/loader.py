@@ -42,6 +42,10 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
     def __len__(self) -> int:
         return len(self.examples)
 
+    def __getstate__(self) -> dict[str, object]:
+        """Without the open file, so that a worker may be started by any means."""
+        return vars(self) | {"_file": None}
+
     def _open(self) -> h5py.File:
         """The stack, opened by this process: HDF5 must not share a file with a parent that forked."""
         if self._file is None or self._reader != os.getpid():

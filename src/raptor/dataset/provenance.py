@@ -14,7 +14,9 @@ from raptor.moulds.geojson import moulds_by_id
 from raptor.moulds.raster import pixel_size
 from raptor.symmetry import Element
 
-MADE_BY = ("source", "model_version", "solver", "accuracy", "layers", "shells", "tension", "configuration")
+MADE_BY = (
+    "source", "model_version", "solver", "accuracy", "device", "layers", "shells", "tension", "configuration",
+)  # fmt: skip
 """Attributes that say what made a file."""
 
 
@@ -98,5 +100,5 @@ def _trace_stack(folder: Path, simulation: int) -> dict[str, Any]:
 
 def _made_by(file: Any) -> dict[str, Any]:
     """Attributes as plain values."""
-    found = {name: getattr(file, name) for name in MADE_BY}
+    found = {name: getattr(file, name) for name in MADE_BY if name in file.ncattrs()}
     return {name: value if isinstance(value, str) else value.tolist() for name, value in found.items()}

@@ -74,6 +74,7 @@ class Shard:
     records: list[Record]
     model: NetworkModel
     accuracy: str
+    device: str
     configuration: str
     failures: dict[int, str]
 
@@ -86,12 +87,13 @@ def write_shard(
     accuracy: str,
     configuration: str,
     failures: dict[int, str] | None = None,
+    device: str = "cpu",
 ) -> None:
-    """Write the simulations of runs, by id, as one shard, whole or not at all."""
+    """Write the simulations of runs, by id, made on a device, as one shard, whole or not at all."""
     failures = failures or {}
     with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
         file.featureType = "point"
-        write_model(file, model, accuracy)
+        write_model(file, model, accuracy, device)
         made = [run for run in runs if run.simulation in simulations]
         ordered = [simulations[run.simulation] for run in made]
         file.createDimension("simulation", len(made))
@@ -108,13 +110,14 @@ def write_shard(
             variable(file, "failure_reason", ("failure",), list(failures.values()), "why it failed")
 
 
-def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str) -> None:
+def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str, device: str) -> None:
     """State as attributes what anyone needs to compute the simulations again."""
     file.shells = np.array(model.shells, dtype=np.int32)
     file.layers = np.int32(model.layers)
     file.tension = model.tension
     file.accuracy = accuracy
     file.solver = accuracy_named(accuracy).solver
+    file.device = device  # on a GPU in single precision
 
 
 def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]) -> None:
@@ -196,6 +199,7 @@ def read_shard(path: Path, configuration: str | None = None) -> Shard:
                 _read_records(file),
                 model,
                 str(file.accuracy),
+                str(getattr(file, "device", "cpu")),  # not stated by shards older than batches
                 str(file.configuration),
                 _read_failures(file),
             )

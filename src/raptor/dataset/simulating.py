@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raptor.condor.accuracy import Simulation, simulate
+from raptor.condor.accuracy import Simulation, accuracy_named, simulate
 from raptor.dataset.design import Run
 from raptor.errors import RaptorError
 from raptor.moulds.geometry import Mould
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("raptor")
 
-BATCHED = ("draft", "standard")  # accuracies that a GPU contracts; others need the processor
 FEW = 16  # runs that are cast without further processes
 
 
@@ -34,13 +33,13 @@ def simulate_shard(
 ) -> tuple[dict[int, Simulation], dict[int, str]]:
     """Simulate runs; returns simulations and reasons of failure, by id.
 
-    On the processor one after another; on a GPU many at once, where the accuracy is one of `BATCHED`. A
-    run that fails is tried once more on the processor, then given up, and the others go on. Want of
+    On the processor one after another; on a GPU many at once, where the accuracy contracts and does no
+    more. A run that fails is tried once more on the processor, then given up, and the others go on. Want of
     memory or disk is no run's fault and is raised, for the workflow to try the whole shard again. `done`
     is told of each run its simulation or the reason why there is none.
     """
     simulations, failures = {}, {}
-    if device != "cpu" and accuracy in BATCHED:
+    if device != "cpu" and accuracy_named(accuracy).contracts_alone:
         simulations = _simulate_together(runs, moulds, model, accuracy, device, done)
     for run in runs:
         if run.simulation in simulations:
@@ -97,7 +96,7 @@ def _cast_all(moulds: list[Mould], model: NetworkModel) -> list["Cast | None"]:
     """Moulds cast for a batch, None where one cannot be; many by all processors, before a GPU is touched."""
     if len(moulds) <= FEW:
         return [_cast(mould, model) for mould in moulds]
-    with ProcessPoolExecutor(os.cpu_count(), get_context("fork")) as pool:
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
         return list(pool.map(_cast, moulds, [model] * len(moulds), chunksize=8))
 
 

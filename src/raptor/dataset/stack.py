@@ -75,8 +75,8 @@ def build_stack(
     Raises
     ------
     RaptorError
-        Where a shard is missing, cut short or of another configuration, a simulation of the
-        design is in none of them, or all of a split failed.
+        Where a shard is missing, cut short, of another configuration or made on another device, a
+        simulation of the design is in none of them, or all of a split failed.
     """
     shards = list(shards)
     failed = _failed(shards, runs, simulation_configuration)
@@ -89,7 +89,12 @@ def build_stack(
         file.missing = " ".join(str(simulation) for simulation in sorted(failed))
         for shard_path in shards:
             shard = read_shard(shard_path, simulation_configuration)
-            write_model(file, shard.model, shard.accuracy)  # the same of all: they share a configuration
+            if getattr(file, "device", shard.device) != shard.device:
+                raise RaptorError(
+                    f"shard {shard_path} was made on another device than those before it; delete the shards "
+                    "of one device and run the workflow again"
+                )
+            write_model(file, shard.model, shard.accuracy, shard.device)  # the same of all
             for record in shard.records:
                 if record.simulation not in left:
                     raise RaptorError(
@@ -195,6 +200,11 @@ def read_table(path: Path) -> StackTable:
     """
     with open_file(path) as file:
         try:
+            if "seed" not in file.variables:
+                raise RaptorError(
+                    f"{path} was made by an earlier version; delete it and run the workflow again, which "
+                    "keeps the simulations"
+                )
             columns = [file[name][:] for name in PARAMETERS]
             return StackTable(
                 file["simulation"][:],

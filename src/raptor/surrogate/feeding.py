@@ -7,7 +7,8 @@ from torch import Tensor
 from torch.utils.data import DataLoader
 
 from raptor.dataset.loader import ExampleSet
-from raptor.symmetry import Element
+from raptor.dataset.scaling import INPUTS
+from raptor.symmetry import FIELDS, Element
 
 Batches = Iterable[tuple[Tensor, Tensor]]
 
@@ -25,39 +26,46 @@ def apply(fields: Tensor, element: Element) -> Tensor:
     return move_pixels(fields, element)[..., source, :, :] * signs[:, None, None]
 
 
+def samples_of(dataset: ExampleSet) -> list[int]:
+    """Rows of the stack that a set's examples are images of."""
+    return sorted({example.sample for example in dataset.examples})
+
+
+def fit_on(device: torch.device, datasets: Sequence[ExampleSet]) -> bool:
+    """Whether all samples of some sets take no more than half of a GPU's free memory."""
+    if device.type != "cuda":
+        return False
+    numbers = sum(len(samples_of(dataset)) * dataset.pixels**2 for dataset in datasets)
+    size = 4 * (len(INPUTS) + len(FIELDS)) * numbers
+    return bool(size < 0.5 * torch.cuda.mem_get_info(device)[0])
+
+
 class Feeder:
     """Gives the examples of a set in any order, in batches on a device.
 
-    Where a GPU has room for all samples at half of its free memory, they are read once and stay there;
-    images are moved under D4 on the device. Otherwise they are read as they are needed, by `workers`
-    processes of their own if there are any.
+    Where they are `resident`, samples are read once and stay on the device, and images are moved under D4
+    there. Otherwise they are read as they are needed, by `workers` processes of their own if there are any.
     """
 
     def __init__(
-        self, dataset: ExampleSet, device: torch.device, workers: int = 0, resident: bool | None = None
+        self, dataset: ExampleSet, device: torch.device, workers: int = 0, resident: bool = False
     ) -> None:
-        self.dataset, self.device, self.workers = dataset, device, workers
-        self.rows = sorted({example.sample for example in dataset.examples})
-        self.resident = self._fits() if resident is None else resident
-        if self.resident:
+        self.dataset, self.device, self.workers, self.resident = dataset, device, workers, resident
+        if resident:
             self._load()
 
     def __len__(self) -> int:
         return len(self.dataset)
 
-    def _fits(self) -> bool:
-        if self.device.type != "cuda":
-            return False
-        inputs, target = self.dataset[0]
-        size = 4 * len(self.rows) * (inputs.numel() + target.numel())
-        return size < 0.5 * torch.cuda.mem_get_info(self.device)[0]
-
     def _load(self) -> None:
-        pairs = [self.dataset.sample(row) for row in self.rows]
-        self.place = {row: number for number, row in enumerate(self.rows)}
-        self.inputs, self.targets = (
-            torch.stack([pair[part] for pair in pairs]).to(self.device) for part in (0, 1)
-        )
+        rows, size = samples_of(self.dataset), 2 * (self.dataset.pixels,)
+        self.place = {row: number for number, row in enumerate(rows)}
+        self.inputs = torch.empty(len(rows), len(INPUTS), *size, device=self.device)
+        self.targets = torch.empty(len(rows), len(FIELDS), *size, device=self.device)
+        for number, row in enumerate(rows):
+            inputs, target = self.dataset.sample(row)
+            self.inputs[number].copy_(inputs)
+            self.targets[number].copy_(target)
 
     def batches(self, order: Sequence[int], size: int) -> Batches:
         """Inputs (n, 5, y, x) and targets (n, 8, y, x) of the examples in this order, n = size or fewer."""

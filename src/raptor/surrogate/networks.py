@@ -1,6 +1,7 @@
 """Networks: pix2pix (Isola et al. 2017, arXiv:1611.07004) and what stands in its generator's place."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -50,6 +51,12 @@ class Architecture:
     def as_json(self) -> dict[str, Any]:
         """As it stands in model.json."""
         return asdict(self)
+
+
+def architecture_of(settings: Mapping[str, Any], pixels: int) -> Architecture:
+    """The architecture that a configuration's block `surrogate` asks for, of images of so many pixels."""
+    names = ("base_channels", "dropout", "patch_layers", "network")
+    return Architecture(settings["pixels"] or pixels, **{name: settings[name] for name in names})
 
 
 class _Down(nn.Sequential):

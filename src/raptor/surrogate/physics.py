@@ -12,20 +12,23 @@ from torch import Tensor, nn
 from torch.nn.functional import conv2d, softplus
 
 from raptor.dataset.scaling import Scaling
-from raptor.fields import SIGMA
+from raptor.fields import DEEP
 from raptor.moulds.raster import pixel_size
 from raptor.symmetry import FIELDS
 
-REACH = 5 * SIGMA  # l0; no density lies deeper in a wall
 SMALL = 1e-12
 ROUNDING = 1e-5
 XX, YY, ZZ, XY, XZ, YZ = (FIELDS.index(name) for name in ("sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz"))
 
 
 def reachable(depression: Tensor) -> Tensor:
-    """Where density may be, (n, 1, y, x) of 0 and 1: within 5 sigma, and a pixel, of the depression's."""
+    """Where density may be, (n, 1, y, x) of 0 and 1: within 5 sigma, and a pixel, of the depression.
+
+    Of a coarse image every pixel counts that holds some of it.
+    """
+    depression = (depression > 0).to(depression.dtype)
     size = pixel_size(depression.shape[-1])
-    reach = REACH + size
+    reach = DEEP + size
     radius = math.ceil(reach / size)
     steps = torch.arange(-radius, radius + 1, device=depression.device) * size
     disc = (steps[:, None] ** 2 + steps**2 <= reach**2).to(depression.dtype)
@@ -51,10 +54,10 @@ class PhysicalFields(nn.Module):
         self.register_buffer("isotropic", torch.tensor([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None, None])
 
     def forward(self, free: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
-        """Scaled fields (n, 8, y, x) from free channels, masks (n, 1, y, x) of 0 and 1, and cells (n,)."""
+        """Scaled fields (n, 8, y, x) from free channels, masks (n, 1, y, x) from 0 to 1, and cells (n,)."""
         there = reachable(depression)
         density = softplus(free[:, :1]) * there
-        density = density * (cells[:, None, None, None] / density.sum((2, 3), keepdim=True))
+        density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
         a, b, c, d, e, f = torch.split(free[:, 2:] + self.isotropic, 1, dim=1)
         parts = [a * a, b * b + c * c, d * d + e * e + f * f, a * b, a * d, b * d + c * e]
         each = density / (parts[0] + parts[1] + parts[2] + SMALL)

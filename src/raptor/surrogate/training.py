@@ -3,7 +3,7 @@
 import logging
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
-from raptor.surrogate.feeding import Batches, Feeder
+from raptor.surrogate.feeding import Batches, Feeder, fit_on
 from raptor.surrogate.losses import discriminator_loss, generator_loss
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
 from raptor.symmetry import FIELDS
@@ -74,6 +74,24 @@ class TrainingRules:
     compiled: bool = False
     deterministic: bool = True
     adversarial: float = 1.0
+
+
+def rules_of(settings: Mapping[str, Any], seed: int, threads: int, device: str) -> TrainingRules:
+    """The training that a configuration's block `surrogate` asks for."""
+    names = (
+        "epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers", "precision", "compiled",
+        "deterministic",
+    )  # fmt: skip
+    judged = settings["adversarial"]
+    if judged is None:
+        judged = 1.0 if settings["network"] == "pix2pix" else 0.0
+    return TrainingRules(
+        **{name: settings[name] for name in names},
+        seed=seed % 2**63,
+        threads=threads,
+        device=device,
+        adversarial=judged,
+    )
 
 
 @dataclass
@@ -140,15 +158,16 @@ def train(
         Where a split has no example, or the loss is no longer finite.
     """
     device = _prepare(rules)
-    feeders = {}
+    datasets = {}
     for name in ("train", "validation"):
         chosen = [example for example in examples if splits[example.sample] == name]
         if not chosen:
             raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
-        dataset = ExampleSet(stack, chosen, scaling, architecture.pixels)
-        feeders[name] = Feeder(dataset, device, rules.workers)
+        datasets[name] = ExampleSet(stack, chosen, scaling, architecture.pixels)
+    resident = fit_on(device, list(datasets.values()))
+    feeders = {name: Feeder(dataset, device, rules.workers, resident) for name, dataset in datasets.items()}
     state = _start(architecture, scaling, rules, device)
-    _resume(state, checkpoint, identity, device)
+    _resume(state, checkpoint, identity)
     for epoch in range(len(state.history), rules.epochs):
         started = time.perf_counter()
         losses = _train_epoch(state, feeders["train"], scaling, rules, epoch)
@@ -216,11 +235,11 @@ def _evaluated(network: nn.Module, rules: TrainingRules) -> Callable[..., Tensor
     return evaluate
 
 
-def _resume(state: _State, checkpoint: Path, identity: str, device: torch.device) -> None:
+def _resume(state: _State, checkpoint: Path, identity: str) -> None:
     if not checkpoint.is_file():
         return
     try:
-        packed = torch.load(checkpoint, map_location=device, weights_only=True)
+        packed = torch.load(checkpoint, map_location="cpu", weights_only=True)
     except Exception as error:
         log.warning("checkpoint %s cannot be read (%s); training starts anew", checkpoint, error)
         return

@@ -60,11 +60,14 @@ def test_jobs_are_submitted_a_cancelled_one_again_and_the_data_are_the_same(
     }
     with log.open("w") as output:
         run = subprocess.Popen(command, cwd=place.folder, env=environment, stdout=output, stderr=output)
-        while not (victims := running("simulate_shard")):
-            assert run.poll() is None, log.read_text()[-3000:]
-            time.sleep(0.1)
-        subprocess.run(["scancel", victims[0]], check=True)
-        assert run.wait(timeout=400) == 0, log.read_text()[-3000:]
+        try:
+            while not (victims := running("simulate_shard")):
+                assert run.poll() is None, log.read_text()[-3000:]
+                time.sleep(0.1)
+            subprocess.run(["scancel", victims[0]], check=True)
+            assert run.wait(timeout=600) == 0, log.read_text()[-3000:]
+        finally:
+            run.kill()
 
     text = log.read_text()
     submitted = re.findall(r"Job \d+ has been submitted with SLURM jobid (\d+)", text)

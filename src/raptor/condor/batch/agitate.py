@@ -83,9 +83,10 @@ class _Colour:
         self.tissue = batch.owner[block]
         first = torch.cumsum(batch.lengths, 0) - batch.lengths
         self.number = (block - first[self.tissue]) * BLOCK + lane  # in its tissue
-        self.neighbours = batch.neighbours[:, block, lane]
-        self.stiffness = batch.stiffness[batch.directions.shell][:, self.tissue]
-        self.stiffness = torch.where(self.neighbours >= 0, self.stiffness, 0.0)
+        other = batch.neighbours[:, block, lane]
+        self.base = torch.where(other >= 0, other, self.cell.to(torch.int32))
+        self.stiffness = batch.stiffness.float()[batch.directions.shell][:, self.tissue]
+        self.stiffness = torch.where(other >= 0, self.stiffness, 0.0)
         self.count = torch.bincount(self.tissue, minlength=batch.tissues)
 
     def tries(
@@ -98,9 +99,8 @@ class _Colour:
         draws = [uniform(key[tissue], count + draw) for draw in range(DRAWS)]
         old = [flat[self.cell + row * BLOCK] for row in range(6)]
         new = _proposed(old, draws, size.float()[tissue], turn.float()[tissue])
-        base = self.neighbours.clamp(min=0)
-        other = [flat[base + row * BLOCK] for row in range(6)]
-        rest, d = batch.directions.rest[:, None], delta.float()[tissue]
+        other = [flat[self.base + row * BLOCK] for row in range(6)]
+        rest, d = batch.directions.rest.float()[:, None], delta.float()[tissue]
         before, after = (bond_stretch(cell, other, rest, d) for cell in (old, new))
         added = 0.5 * (self.stiffness * (after - before) * (after + before)).sum(0)
         there = torch.ones_like(tissue, dtype=torch.bool)
@@ -111,7 +111,7 @@ class _Colour:
         for row in range(6):
             flat[self.cell + row * BLOCK] = torch.where(taken, new[row], old[row])
         # Cells of a tissue stand together, in the order of tissues.
-        return torch.segment_reduce(taken.double(), "sum", lengths=self.count)
+        return torch.segment_reduce(taken.double(), "sum", lengths=self.count, unsafe=True)
 
 
 def _proposed(old: list[Tensor], draws: list[Tensor], size: Tensor, turn: Tensor) -> list[Tensor]:

@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from itertools import count
 
 import numpy as np
 import torch
@@ -20,7 +21,6 @@ from raptor.condor.batch.energy import cell_tension, objective, reversed_bonds, 
 from raptor.condor.batch.layout import BLOCK, Batch, Cast, build_batch
 from raptor.condor.batch.minimise import Goal, Minimiser
 from raptor.condor.contract import CONTACT, steps_to
-from raptor.condor.minimise import MEMORY
 from raptor.condor.system import cast_state
 from raptor.errors import RaptorError
 from raptor.moulds.geometry import Mould
@@ -28,7 +28,8 @@ from raptor.parameters import CellParameters, NetworkModel
 
 TOGETHER = 0.25  # part of the tissues that must have finished a step before they are looked at
 PATIENCE = 100  # evaluations after which those that have are looked at anyway
-BYTES_A_CELL = 4 * (42 + 6 * (2 * MEMORY + 20))  # neighbours; pairs, states and what is made of them
+LOOK = 5  # evaluations between looks at who is done, for which a GPU must wait
+BYTES_A_CELL = 2000  # measured at most 1,750: neighbours, pairs, states, and copies while a batch changes
 PHASES = 3  # of a step: minimised; unfolded from there; unfolded from where the step began
 
 
@@ -206,11 +207,12 @@ class BatchSolver:
         """Minimise until some tissues have finished their steps; returns which."""
         minimiser = self._busy()
         enough = max(1, int(TOGETHER * minimiser.batch.tissues))
-        for evaluation in range(10**9):
-            idle = int((~minimiser.busy).sum())
-            if idle >= enough or (idle and evaluation >= PATIENCE):
-                break
-            self.evaluated += int((minimiser.busy * minimiser.batch.cells).sum())
+        for evaluation in count():
+            if evaluation % LOOK == 0:
+                idle = int((~minimiser.busy).sum())
+                if idle >= enough or (idle and evaluation >= PATIENCE):
+                    break
+                self.evaluated += LOOK * int((minimiser.busy * minimiser.batch.cells).sum())
             minimiser.step()
         return np.asarray((~minimiser.busy).cpu().numpy())
 
@@ -240,7 +242,8 @@ class BatchSolver:
         """Simulations of the tissues that retire; `seconds` is what an evaluation of a cell takes."""
         part, progress = self._busy().take(self._mask(retired)), self.progress.take(retired)
         batch, goal = part.batch, part.goal
-        state = units(part.state)[0]
+        # As they will be stored, but seen in double precision: who computes them again finds the same.
+        state = units(units(part.state)[0].double())[0]
         found = objective(batch, state, goal.delta, goal.contact)
         tension = cell_tension(batch, state, goal.delta, self.model.tension).cpu().numpy().ravel()
         cells = state.movedim(1, 2).reshape(-1, 6).double().cpu().numpy()
@@ -298,7 +301,7 @@ class BatchSolver:
 def _batched(name: str) -> Accuracy:
     """An accuracy whose solver contracts and does no more."""
     accuracy = accuracy_named(name)
-    if accuracy.anneal_sweeps or accuracy.rounds:
+    if not accuracy.contracts_alone:
         raise RaptorError(
             f"accuracy is '{name}'; tissues are contracted in batches at draft or standard; choose "
             "one of these, or device: cpu"

@@ -45,17 +45,18 @@ class Objective(NamedTuple):
 
 
 def _bond_terms(
-    flat: Tensor, own: Tensor, addresses: Tensor, stiffness: Tensor, rest: Tensor, unit: Tensor,
-    delta: Tensor, contact: Tensor,
+    flat: Tensor, own: Tensor, places: Tensor, addresses: Tensor, stiffness: Tensor, rest: Tensor,
+    unit: Tensor, delta: Tensor, contact: Tensor,
 ) -> Terms:  # fmt: skip
     """Sums over some directions of bonds.
 
-    `flat` is the unit state, `own` (6, blocks, BLOCK) the cells', `addresses` (directions, blocks, BLOCK),
+    `flat` is the unit state, `own` (6, blocks, BLOCK) the cells' and `places` their addresses, `addresses`
+    (directions, blocks, BLOCK) of the other ends; a cell without one looks at itself, and at no other tissue;
     `stiffness` (directions, blocks, 1), `rest` and `unit` with a row a direction, `delta` and `contact`
     (blocks, 1).
     """
     there = addresses >= 0
-    base = addresses.clamp(min=0)
+    base = torch.where(there, addresses, places)
     x, y, z, ax, ay, az = own.unbind(0)
     lx = flat[base] - x
     ly = flat[base + BLOCK] - y
@@ -99,7 +100,8 @@ def _compiled() -> Callable[..., Terms]:
 def _all_bonds(batch: Batch, unit: Tensor, delta: Tensor, contact: Tensor) -> Terms:
     """Sums over all directions of bonds, for a unit state (blocks, 6, BLOCK)."""
     along = batch.directions
-    stiffness = batch.stiffness[along.shell][:, batch.owner, None]
+    kind = unit.dtype
+    stiffness = batch.stiffness[along.shell].to(kind)[:, batch.owner, None]
     flat, own = unit.reshape(-1), unit.movedim(1, 0)
     step, terms = len(along.rest), _compiled() if unit.is_cuda else _bond_terms
     if not unit.is_cuda:
@@ -111,12 +113,13 @@ def _all_bonds(batch: Batch, unit: Tensor, delta: Tensor, contact: Tensor) -> Te
             terms(
                 flat,
                 own,
+                batch.places,
                 batch.neighbours[some],
                 stiffness[some],
-                along.rest[some],
-                along.unit[some],
-                batch.spread(delta.float()),
-                batch.spread(contact.float()),
+                along.rest[some].to(kind),
+                along.unit[some].to(kind),
+                batch.spread(delta.to(kind)),
+                batch.spread(contact.to(kind)),
             )
         )
     if len(passes) == 1:
@@ -136,7 +139,7 @@ def objective(batch: Batch, state: Tensor, delta: Tensor, contact: Tensor) -> Ob
     Parameters
     ----------
     state : Tensor (blocks, 6, BLOCK)
-        Positions (l0) and vectors along orientations.
+        Positions (l0) and vectors along orientations; all is computed in their precision.
     delta, contact : Tensor (tissues,)
         Cell-matrix interaction, and stiffness of contacts (kappa0), of each tissue.
     """
@@ -189,12 +192,12 @@ def wall_terms(
 
 def reversed_bonds(batch: Batch, state: Tensor) -> Tensor:
     """Share of each tissue's bonds whose direction has reversed since casting, (tissues,) float64."""
-    flat, along = state.reshape(-1), batch.directions.unit
+    flat, along = state.reshape(-1), batch.directions.unit.to(state.dtype)
     count = torch.zeros(batch.blocks, dtype=torch.int64, device=state.device)
     bonds = torch.zeros_like(count)
     stiff = batch.stiffness[:, batch.owner] > 0  # a bond of no stiffness is none
     for addresses, direction, shell in zip(batch.neighbours, along, batch.directions.shell, strict=True):
-        base = addresses.clamp(min=0)
+        base = torch.where(addresses >= 0, addresses, batch.places)
         moved = [(flat[base + axis * BLOCK] - state[:, axis]) * direction[axis] for axis in range(3)]
         ahead = moved[0] + moved[1] + moved[2]
         there = (addresses >= 0) & stiff[shell][:, None]
@@ -208,12 +211,13 @@ def cell_tension(batch: Batch, state: Tensor, delta: Tensor, kind: str = "hooke"
     """Mean tension of each cell's bonds, (blocks, BLOCK), as `raptor.condor.energy.cell_tension`."""
     unit = units(state)[0]
     flat, along = unit.reshape(-1), batch.directions
-    d = batch.spread(delta.float())
+    d = batch.spread(delta.to(unit.dtype))
     total = torch.zeros_like(unit[:, 0])
     bonds = torch.zeros_like(total)
     for addresses, rest, shell in zip(batch.neighbours, along.rest, along.shell, strict=True):
-        stiffness = torch.where(addresses >= 0, batch.stiffness[shell][batch.owner][:, None], 0.0)
-        base = addresses.clamp(min=0)
+        stiffness = batch.stiffness[shell].to(unit.dtype)[batch.owner][:, None]
+        stiffness = torch.where(addresses >= 0, stiffness, 0.0)
+        base = torch.where(addresses >= 0, addresses, batch.places)
         cell, other = unit.unbind(1), [flat[base + row * BLOCK] for row in range(6)]
         stretch = bond_stretch(cell, other, rest, d)
         if kind == "hooke":

@@ -9,6 +9,7 @@ so bonds are one table of addresses a direction, with -1 where there is no cell.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -59,9 +60,9 @@ class Directions:
     shell : Tensor (directions,)
         0, 1 or 2: which spring constant.
     rest : Tensor (directions,)
-        Rest length, l0.
+        Rest length, l0, float64.
     unit : Tensor (directions, 3)
-        Direction at casting.
+        Direction at casting, float64.
     """
 
     offsets: NDArray[np.int64]
@@ -78,12 +79,7 @@ def directions(model: NetworkModel, device: torch.device) -> Directions:
     shell = np.repeat(np.arange(len(both)), [len(offsets) for offsets in both])
     rest = np.array([SHELL_DISTANCE[model.shells[s]] for s in shell])
     unit = offsets * (0.5, 0.5, np.sqrt(0.5)) / rest[:, None]
-    return Directions(
-        offsets,
-        torch.tensor(shell, device=device),
-        torch.tensor(rest, dtype=torch.float32, device=device),
-        torch.tensor(unit, dtype=torch.float32, device=device),
-    )
+    return Directions(offsets, *(torch.tensor(values, device=device) for values in (shell, rest, unit)))
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ class Batch:
     Parameters
     ----------
     sites : Tensor (blocks, 3, BLOCK)
-        Cast positions, l0; far above the mould where a block has no cell.
+        Cast positions, l0; where a block has no cell, a point between floor and fill height.
     neighbours : Tensor (directions, blocks, BLOCK)
         Addresses of the cells at the other ends of bonds, int32, -1 where there is none.
     owner : Tensor (blocks,)
@@ -105,7 +101,7 @@ class Batch:
     colour : Tensor (blocks, BLOCK)
         Cells of one colour share no bond; -1 where there is no cell.
     stiffness : Tensor (3, tissues)
-        Spring constants, kappa0.
+        Spring constants, kappa0, float64.
     depth, corner, start : Tensor (knots,), (tissues, 4), (tissues,)
         Tables of the walls one after another; rows, columns (as numbers) and origin of each; where each
         begins.
@@ -145,11 +141,19 @@ class Batch:
 
     def total(self, values: Tensor) -> Tensor:
         """Sum over the blocks of each tissue: (blocks, ...) to (tissues, ...), always in the same order."""
-        return torch.segment_reduce(values, "sum", lengths=self.lengths, axis=0)
+        # unsafe: the lengths are ours, and need not be looked at on the processor each time
+        return torch.segment_reduce(values, "sum", lengths=self.lengths, axis=0, unsafe=True)
 
     def largest(self, values: Tensor) -> Tensor:
         """Largest over the blocks of each tissue, (blocks,) to (tissues,)."""
-        return torch.segment_reduce(values, "max", lengths=self.lengths, axis=0)
+        return torch.segment_reduce(values, "max", lengths=self.lengths, axis=0, unsafe=True)
+
+    @cached_property
+    def places(self) -> Tensor:
+        """Every cell's own address, (blocks, BLOCK), int32."""
+        lanes = torch.arange(BLOCK, dtype=torch.int32, device=self.owner.device)
+        blocks = torch.arange(self.blocks, dtype=torch.int32, device=self.owner.device)
+        return blocks[:, None] * ROW + lanes
 
     def blocks_of(self, chosen: Tensor) -> Tensor:
         """Whether each block belongs to the tissues chosen by a mask (tissues,)."""
@@ -158,22 +162,23 @@ class Batch:
     def take(self, chosen: Tensor) -> "Batch":
         """The batch of the tissues chosen by a mask (tissues,), in their order."""
         keep = self.blocks_of(chosen)
-        moved = torch.cumsum(keep, 0) - 1  # new place of each block
+        moved = (torch.cumsum(keep, 0) - 1).to(torch.int32)  # new place of each block
         old = self.neighbours[:, keep]
         block = torch.div(old.clamp(min=0), ROW, rounding_mode="floor")
-        new = (moved[block] - block) * ROW + old
         rank = torch.cumsum(chosen, 0) - 1
+        knots = (self.corner[:, 0] * self.corner[:, 1]).long()
+        start = torch.cumsum(knots[chosen], 0) - knots[chosen]
         return Batch(
             self.sites[keep],
-            torch.where(old < 0, old, new.to(torch.int32)),
+            torch.where(old < 0, old, (moved[block] - block) * ROW + old),
             rank[self.owner[keep]],
             self.lengths[chosen],
             self.cells[chosen],
             self.colour[keep],
             self.stiffness[:, chosen],
-            self.depth,
+            self.depth[torch.repeat_interleave(chosen, knots)],
             self.corner[chosen],
-            self.start[chosen],
+            start,
             self.height,
             self.wall,
             self.directions,
@@ -215,7 +220,7 @@ def build_batch(
         put(lengths, torch.int64),
         put([len(c.sites) for c in casts], torch.int64),
         put(colour.reshape(blocks, BLOCK), torch.int8),
-        put(np.array(kappas).T, torch.float32),
+        put(np.array(kappas).T, torch.float64),
         put(np.concatenate([table.ravel() for table in tables]), torch.float32),
         put(corner, torch.float32),
         put(np.concatenate([[0], ends[:-1]]), torch.int64),
@@ -260,7 +265,7 @@ def _neighbours(sites: NDArray[np.float64], layers: int, offsets: NDArray[np.int
 def _colours(sites: NDArray[np.float64], model: NetworkModel) -> NDArray[np.int8]:
     """A colour for each cell: two cells of one colour are farther apart than any bond is long.
 
-    A lattice of cubes of side 2 l0 (3 l0 where bonds are 2 l0 long), counted in half l0 and layers.
+    They repeat after 2 l0 in the plane and 4 layers (3 l0 and 6 layers where bonds are 2 l0 long).
     """
     side = 6 if max(SHELL_DISTANCE[shell] for shell in model.shells) >= 2 else 4
     steps = np.rint(sites * (2, 2, np.sqrt(2)) - (0, 0, 0.5)).astype(int) % side

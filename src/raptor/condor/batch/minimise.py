@@ -113,6 +113,7 @@ class Minimiser:
         self.energy = torch.where(chosen, found.energy, self.energy)
         self.walled = torch.where(chosen, walled, self.walled)
         self.used = torch.where(chosen, 1, self.used)
+        self.tries = torch.where(chosen, 0, self.tries)
         self.looked = torch.where(chosen, 1, self.looked)
         self.looked_at = torch.where(chosen, found.energy + walled, self.looked_at)
         self.calm &= ~chosen

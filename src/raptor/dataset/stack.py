@@ -103,26 +103,27 @@ def build_stack(
                     )
                 left.remove(record.simulation)
                 run = by_id[record.simulation]
-                row = order[record.simulation]
-                image = mould_image(moulds[run.mould], pixels)
-                write(
-                    row,
-                    Sample(
-                        record_fields(record, pixels, device),
-                        image.depression.astype(np.uint8),
-                        image.tethers.astype(np.uint8),
-                        run.parameters,
-                        run.simulation,
-                        run.seed,
-                        run.mould,
-                        run.split,
-                        len(record.positions),
-                        record.converged,
-                    ),
-                )
-                done(row)
+                write(order[record.simulation], _sample(record, run, moulds[run.mould], pixels, device))
+                done(order[record.simulation])
         if left:
             raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
+
+
+def _sample(record: Record, run: Run, mould: Mould, pixels: int, device: str) -> Sample:
+    """A simulation as images, and where it comes from."""
+    image = mould_image(mould, pixels)
+    return Sample(
+        fields=record_fields(record, pixels, device),
+        depression=image.depression.astype(np.uint8),
+        tethers=image.tethers.astype(np.uint8),
+        parameters=run.parameters,
+        simulation=run.simulation,
+        seed=run.seed,
+        mould=run.mould,
+        split=run.split,
+        n_cells=len(record.positions),
+        converged=record.converged,
+    )
 
 
 def _failed(shards: list[Path], runs: Sequence[Run], configuration: str) -> set[int]:

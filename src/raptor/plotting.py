@@ -129,6 +129,7 @@ def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
     axes.plot([low - pad, high + pad], [low - pad, high + pad], "--", color=THIRD, lw=0.8)
     axes.plot(simulated, predicted, "o", color=SIMULATED, ms=4, alpha=0.75, mec="none")
     axes.set(xlim=(low - pad, high + pad), ylim=(low - pad, high + pad), box_aspect=1)
+    axes.locator_params(nbins=4)
 
 
 @STYLED

@@ -20,7 +20,7 @@ README_HEAD = """# Configuration
 differs and is chosen by `workflow/env snakemake --cores all --configfile config/paper.yaml`. Unknown keys
 are errors. Moulds are GeoJSON (`moulds/`), measured tissues stand in `tissues.yaml`.
 
-This table and `laptop.yaml` are generated from the model in `src/raptor/configuration.py` by
+This table and `laptop.yaml` are generated from the model in `src/raptor/configuration/` by
 `workflow/env raptor reference`.
 
 """

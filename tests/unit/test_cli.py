@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -110,20 +111,31 @@ def test_a_failed_writer_leaves_what_was_there(tmp_path):
 
 def test_predict_writes_fields_that_check_takes(tmp_path):
     from raptor.dataset.scaling import Scaling
-    from raptor.surrogate.inference import save
+    from raptor.surrogate.calibration import Calibration, Scale
+    from raptor.surrogate.files import save
     from raptor.surrogate.networks import Architecture, Generator, initialise
+    from raptor.surrogate.novelty import DESCRIPTORS, Novelty
 
     architecture = Architecture(32, 4)
     scaling = Scaling((0.5,) * 8, (0.5,) * 8)
-    weights = initialise(Generator(architecture, scaling)).state_dict()
+    weights = [initialise(Generator(architecture, scaling)).state_dict() for _ in range(2)]
     save(tmp_path, weights, architecture, scaling, 4, 32, {}, "x")
     output = tmp_path / "prediction.nc"
     done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
+    assert done.returncode == 1
+    assert "not calibrated" in done.stderr
+    scales = [Scale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 2)]
+    novelty = Novelty(np.random.default_rng(0).normal(size=(9, len(DESCRIPTORS))).astype(np.float32), 1e-3)
+    save(tmp_path, weights, architecture, scaling, 4, 32, {}, "x", Calibration(*scales, 0.1, novelty))
+    done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
     assert done.returncode == 0, done.stderr
     assert "A/A0" in done.stdout
+    assert "unlike the training set" in done.stdout
     with xr.open_dataset(output) as prediction:
         assert prediction["fields"].dims == ("sample", "field", "y", "x")
+        assert prediction["fields_band"].dims == ("sample", "level", "field", "y", "x")
         assert float(prediction["delta"][0]) == 0.5
+        assert float(prediction["area_ratio_band"][0, 2]) >= 0.3
     assert raptor("check", output).returncode == 0
 
 

@@ -55,10 +55,35 @@ def test_a_fingerprint_changes_with_what_it_depends_on_alone():
     plain = Configuration()
     cores = Configuration.model_validate({"simulation": {"shard_size": 9}, "fit": {"starts": 16}})
     pixels = Configuration.model_validate({"fields": {"pixels": 64}})
-    for stage in ("design", "simulation", "dataset", "surrogate"):
+    for stage in ("design", "simulation", "dataset"):
         assert plain.fingerprint(stage) == cores.fingerprint(stage)
+    for further in plain.further_sets:
+        assert plain.further_fingerprint(further) == cores.further_fingerprint(further)
+    more = Configuration.model_validate({"surrogate": {"members": 5, "workers": 2}})
+    longer = Configuration.model_validate({"surrogate": {"epochs": 5}})
+    for model in ("compact", "pix2pix"):
+        assert plain.model_fingerprint(model) == more.model_fingerprint(model)
+        assert plain.model_fingerprint(model) != longer.model_fingerprint(model)
     assert plain.fingerprint("simulation") == pixels.fingerprint("simulation")
     assert plain.fingerprint("dataset") != pixels.fingerprint("dataset")
+
+
+def test_a_compared_model_is_the_surrogate_but_for_its_keys():
+    compared = {"other": {"network": "fno", "epochs": 3}}
+    config = Configuration.model_validate(
+        {"surrogate": {"members": 4, "batch_size": 7}, "compared": compared}
+    )
+    assert list(config.models) == ["compact", "other"]
+    other = config.models["other"]
+    assert (other.network, other.epochs, other.batch_size, other.members) == ("fno", 3, 7, 1)
+    for changes, message in (
+        ({"compact": {}}, "has the name of surrogate.model"),
+        ({"other": {"epoch": 3}}, "has the key 'epoch'"),
+        ({"other": {"epochs": 0}}, "greater than or equal to 1"),
+        ({"other": {"pixels": 256}}, "more than fields.pixels"),
+    ):
+        with pytest.raises(ValidationError, match=message):
+            Configuration.model_validate({"compared": changes})
 
 
 def test_all_tissues_can_be_fitted(root, monkeypatch):

@@ -14,8 +14,8 @@ from raptor.fitting import Target, fit, parameters_at
 from raptor.moulds import Mould, mould_image
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.surrogate.feeding import Feeder
-from raptor.surrogate.inference import load, save
-from raptor.surrogate.losses import discriminator_loss, generator_loss
+from raptor.surrogate.files import load, save
+from raptor.surrogate.losses import discriminator_loss, generator_loss, relative_distance
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
 from raptor.surrogate.training import TrainingRules, train
 
@@ -28,6 +28,9 @@ def test_the_networks_take_any_power_of_two(pixels):
     architecture = Architecture(pixels, 4)
     inputs, fields = torch.zeros(2, 5, pixels, pixels), torch.zeros(2, 8, pixels, pixels)
     assert Generator(architecture, SCALING)(inputs, torch.ones(2)).shape == fields.shape
+    for network in ("modulated", "compact", "fno"):
+        other = Generator(Architecture(pixels, 4, network=network), SCALING)
+        assert other(inputs, torch.ones(2)).shape == fields.shape
     for layers in (1, 3, 5):
         assert Discriminator(Architecture(pixels, 4, 0.5, layers))(inputs, fields).shape[:2] == (2, 1)
     with pytest.raises(RaptorError, match="power of two"):
@@ -46,6 +49,17 @@ def test_the_discriminator_sees_patches_of_seventy_pixels():
 def test_pix2pix_of_the_published_size_has_its_54_million_weights():
     generator = Generator(Architecture(256, 64), SCALING)
     assert sum(p.numel() for p in generator.parameters()) == pytest.approx(54.4e6, rel=0.01)
+
+
+def test_the_relative_distance_counts_each_field_of_each_sample_alike():
+    generator = torch.Generator().manual_seed(0)
+    target = torch.randn(3, 8, 16, 16, generator=generator)
+    sizes = torch.tensor([1.0, 100.0, 0.01])[:, None, None, None] * torch.logspace(-3, 3, 8)[:, None, None]
+    assert float(relative_distance(target, target)) < 1e-4
+    alike = relative_distance(torch.zeros_like(target), target)
+    assert float(alike) == pytest.approx(1 / np.sqrt(1.1), rel=0.02)
+    loud = relative_distance(0 * target[:1], target[:1] * sizes[:1])
+    assert float(loud) == pytest.approx(float(alike), rel=0.02)
 
 
 def test_losses():
@@ -78,7 +92,7 @@ def training(training_rules, made, tmp_path):
 
 def test_training_learns_and_is_repeatable(training):
     a, b = training(4, "a.pt"), training(4, "b.pt")
-    assert a.history["l1"].iloc[-1] < a.history["l1"].iloc[0]
+    assert a.history["distance"].iloc[-1] < a.history["distance"].iloc[0]
     assert all(torch.equal(a.weights[k], b.weights[k]) for k in a.weights)
 
 
@@ -89,7 +103,7 @@ def test_training_in_bfloat16_keeps_float32_weights(training_rules, made, tmp_pa
         stack, augment(stack), read_table(stack).split, training_scaling(stack), Architecture(32, 4, 0.5),
         rules, tmp_path / "half.pt", "half",
     )  # fmt: skip
-    assert trained.history["l1"].iloc[-1] < trained.history["l1"].iloc[0]
+    assert trained.history["distance"].iloc[-1] < trained.history["distance"].iloc[0]
     assert {value.dtype for value in trained.weights.values()} == {torch.float32, torch.int64}
 
 
@@ -104,14 +118,15 @@ def test_examples_kept_on_a_device_are_the_loaders(made):
         assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
 
 
-def test_the_compact_network_learns_without_a_discriminator(training_rules, made, tmp_path):
+@pytest.mark.parametrize("network", ["modulated", "compact", "fno"])
+def test_other_networks_learn_without_a_discriminator(training_rules, made, tmp_path, network):
     stack = made / "dataset" / "fields.nc"
-    rules = replace(training_rules, epochs=3, learning_rate=3e-3, adversarial=0.0)
+    rules = replace(training_rules, epochs=3, learning_rate=3e-3, adversarial=0.0, loss="relative")
     trained = train(
         stack, augment(stack), read_table(stack).split, training_scaling(stack),
-        Architecture(32, 4, network="compact"), rules, tmp_path / "compact.pt", "compact",
+        Architecture(32, 4, network=network), rules, tmp_path / "other.pt", network,
     )  # fmt: skip
-    assert trained.history["l1"].iloc[-1] < trained.history["l1"].iloc[0]
+    assert trained.history["distance"].iloc[-1] < trained.history["distance"].iloc[0]
     assert (trained.history["discriminator_loss"] == 0).all()
 
 
@@ -132,7 +147,7 @@ def test_training_resumed_is_training_undisturbed(training, tmp_path, monkeypatc
         training(4, "resumed.pt")
     monkeypatch.setattr(module, "_train_epoch", real)
     resumed = training(4, "resumed.pt")
-    columns = ["epoch", "generator_loss", "l1", "discriminator_loss", "validation_error"]
+    columns = ["epoch", "generator_loss", "distance", "discriminator_loss", "validation_error"]
     assert whole.history[columns].equals(resumed.history[columns])
     assert all(torch.equal(whole.weights[k], resumed.weights[k]) for k in whole.weights)
 
@@ -151,7 +166,7 @@ def test_a_checkpoint_of_another_training_or_cut_short_is_ignored(training, tmp_
 def model_folder(tmp_path):
     architecture = Architecture(32, 4)
     generator = initialise(Generator(architecture, SCALING))
-    save(tmp_path / "model", generator.state_dict(), architecture, SCALING, 4, architecture.pixels, {}, "a")
+    save(tmp_path / "model", [generator.state_dict()], architecture, SCALING, 4, architecture.pixels, {}, "a")
     return tmp_path / "model"
 
 

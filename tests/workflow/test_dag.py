@@ -11,7 +11,10 @@ from tests.workflow.test_end_to_end import variant
 
 EVERYTHING = {
     "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
-    "augment_dataset", "check_dataset", "write_card", "train_surrogate", "evaluate_surrogate",
+    "augment_dataset", "check_dataset", "write_card", "train_member", "assemble_model",
+    "design_further", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
+    "evaluate_baseline", "compare_models", "summarise_evaluation", "plot_calibration", "plot_regions",
+    "plot_worst", "plot_models",
     "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
     "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",
 }  # fmt: skip
@@ -57,7 +60,7 @@ def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
             {"sample_design", "simulate_shard", "build_stack", "check_dataset"},
         ),
         ({"fields__pixels": 64}, {"sample_design", "simulate_shard"}),
-        ({"tradeoff__seeds": 5}, {"simulate_shard", "train_surrogate", "fit_tissue", "plot_fit"}),
+        ({"tradeoff__seeds": 5}, {"simulate_shard", "train_member", "fit_tissue", "plot_fit"}),
         ({"simulation__accuracy": "standard"}, {"sample_design", "compile_kernels", "plot_design"}),
         ({"seed": 1}, {"compile_kernels"}),
     ],
@@ -71,9 +74,9 @@ def test_a_change_runs_what_hangs_on_it_and_no_more(place, tmp_path, change, not
 
 def test_targets_make_their_part(workplace):
     place = workplace("targets")
-    assert "train_surrogate" not in place.jobs("dataset")
-    assert "evaluate_surrogate" not in place.jobs("train")
-    assert {"evaluate_surrogate", "train_surrogate"} <= place.jobs("evaluate")
+    assert "train_member" not in place.jobs("dataset")
+    assert "evaluate_model" not in place.jobs("train")
+    assert {"evaluate_model", "train_member"} <= place.jobs("evaluate")
     assert {"fit_tissue", "plot_fit"} <= place.jobs("fit")
     assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
     assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")

@@ -76,16 +76,29 @@ def test_every_file_says_what_it_is(results):
 
 
 def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
-    weights = load_file(results / "surrogate" / "pix2pix" / "weights.safetensors")
+    weights = load_file(results / "surrogate" / "compact" / "weights.safetensors")
     assert all(np.isfinite(value).all() for value in weights.values())
-    history = pd.read_csv(results / "surrogate" / "pix2pix" / "training.csv")
-    assert history["epoch"].tolist() == [0, 1]
+    assert {name.split(".")[0] for name in weights} == {"0", "1", "novelty"}
+    history = pd.read_csv(results / "surrogate" / "compact" / "training.csv")
+    assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
-    metrics = json.loads((results / "evaluation" / "pix2pix" / "metrics.json").read_text())
-    assert metrics["samples"] == 2
-    assert set(metrics["bulk"]) == {
+    metrics = json.loads((results / "evaluation" / "metrics.json").read_text())
+    assert set(metrics) == {"test", "corner"}
+    assert metrics["test"]["samples"] == 2
+    assert set(metrics["test"]["bulk"]) == {
         "P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar", "area_ratio", "width_ratio",
     }  # fmt: skip
+    assert all(0 <= share <= 1 for share in metrics["test"]["coverage"].values())
+    floor = pd.read_csv(results / "evaluation" / "floor.csv")
+    assert floor["runs"].tolist() == [3]
+    assert (floor["vrmse_density"] > 0).all()
+    models = pd.read_csv(results / "evaluation" / "models.csv").set_index("model")
+    assert models.index.tolist() == ["compact", "pix2pix", "nearest", "mean"]
+    assert (models.loc[["compact", "pix2pix"], "training_core_minutes"] > 0).all()
+    assert models["density_in_floors"].notna().all()
+    regions = pd.read_csv(results / "evaluation" / "regions.csv").set_index("region")
+    assert regions.loc["all", "samples"] == 2
+    assert regions.loc["further: corner", "samples"] == 2
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
@@ -99,7 +112,10 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
 
 
 def test_every_figure_has_its_data(results):
-    for figure in ("design", "fields", "bulk", "training", "tradeoff", "folding", "fit_glial_1"):
+    for figure in (
+        "design", "fields", "bulk", "training", "calibration", "regions", "worst", "models", "tradeoff",
+        "folding", "fit_glial_1",
+    ):  # fmt: skip
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made
         assert made & {".csv", ".nc"}
@@ -136,7 +152,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     """SIGKILL to everything, twice: among simulations and in training."""
     place = workplace("killed")
     folder = place.folder / "results" / "tiny"
-    for seen in ("simulations/00000-00002.nc", "surrogate/pix2pix/checkpoint.pt"):
+    for seen in ("simulations/00000-00002.nc", "surrogate/compact/members/0/checkpoint.pt"):
         run = subprocess.Popen(
             place.command("--cores", "2", "--nolock", "--rerun-incomplete", "train"),
             cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
@@ -151,7 +167,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     done = place.run("--cores", "2", "train")
     assert done.returncode == 0, done.stderr[-2000:]
     assert differences(results, folder) == []
-    weights = [load_file(f / "surrogate" / "pix2pix" / "weights.safetensors") for f in (results, folder)]
+    weights = [load_file(f / "surrogate" / "compact" / "weights.safetensors") for f in (results, folder)]
     assert all(np.array_equal(weights[0][name], weights[1][name]) for name in weights[0])
 
 

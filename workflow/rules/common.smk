@@ -6,6 +6,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from raptor import MODEL_VERSION, configuration
+from raptor.baselines import BASELINES
 from raptor.compiled import source_hash
 from raptor.errors import RaptorError
 
@@ -25,8 +26,19 @@ config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
 
 RESULTS = f"results/{CONFIG.name}"
 CASES = {case.name: case for case in CONFIG.tradeoff.cases}
-MODEL = f"{RESULTS}/surrogate/{CONFIG.surrogate.model}"
-FIGURES = ("design", "fields", "bulk", "training", "tradeoff")
+MODELS = CONFIG.models
+SETS = CONFIG.further_sets
+FIGURES = (
+    "design",
+    "fields",
+    "bulk",
+    "training",
+    "calibration",
+    "regions",
+    "worst",
+    "models",
+    "tradeoff",
+)
 
 
 wildcard_constraints:
@@ -34,6 +46,9 @@ wildcard_constraints:
     tissue="|".join(CONFIG.fit.tissues),
     figure="|".join(FIGURES),
     case="|".join(CASES),
+    model="|".join([*MODELS, *BASELINES]),
+    member=r"\d+",
+    set="|".join(["test", *SETS]),
 
 
 localrules:

@@ -30,8 +30,8 @@ rule plot_fields:
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.sample_design.output.moulds,
-        metrics=rules.evaluate_surrogate.output.metrics,
-        weights=rules.train_surrogate.output.weights,
+        metrics=rules.summarise_evaluation.output.metrics,
+        weights=SURROGATE["weights"],
     output:
         png=report(
             f"{RESULTS}/figures/fields.png",
@@ -54,8 +54,8 @@ rule plot_fields:
 rule plot_bulk:
     """The paper's figure: eight bulk statistics, predicted against simulated."""
     input:
-        metrics=rules.evaluate_surrogate.output.metrics,
-        summary=rules.evaluate_surrogate.output.summary,
+        metrics=rules.summarise_evaluation.output.metrics,
+        summary=rules.summarise_evaluation.output.summary,
     output:
         png=report(
             f"{RESULTS}/figures/bulk.png",
@@ -78,7 +78,7 @@ rule plot_bulk:
 rule plot_training:
     """Losses and validation error, epoch by epoch."""
     input:
-        history=rules.train_surrogate.output.history,
+        history=SURROGATE["history"],
     output:
         png=report(
             f"{RESULTS}/figures/training.png",
@@ -96,6 +96,104 @@ rule plot_training:
         mem_mb=800,
     script:
         "../scripts/plot_training.py"
+
+
+rule plot_calibration:
+    """Whether bands hold what they promise."""
+    input:
+        metrics=rules.summarise_evaluation.output.metrics,
+        summary=rules.summarise_evaluation.output.summary,
+    output:
+        png=report(
+            f"{RESULTS}/figures/calibration.png",
+            caption="../report/plot_calibration.rst",
+            category="Surrogate",
+        ),
+        svg=f"{RESULTS}/figures/calibration.svg",
+        data=f"{RESULTS}/figures/calibration.csv",
+    log:
+        f"{RESULTS}/logs/plot_calibration.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_calibration.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    script:
+        "../scripts/plot_calibration.py"
+
+
+rule plot_regions:
+    """Errors by region of the parameters, and on further sets."""
+    input:
+        metrics=rules.summarise_evaluation.output.metrics,
+        regions=rules.summarise_evaluation.output.regions,
+    output:
+        png=report(
+            f"{RESULTS}/figures/regions.png",
+            caption="../report/plot_regions.rst",
+            category="Surrogate",
+        ),
+        svg=f"{RESULTS}/figures/regions.svg",
+        data=f"{RESULTS}/figures/regions.csv",
+    log:
+        f"{RESULTS}/logs/plot_regions.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_regions.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    script:
+        "../scripts/plot_regions.py"
+
+
+rule plot_worst:
+    """The twelve held-out cases whose density is predicted worst."""
+    input:
+        stack=rules.build_stack.output.stack,
+        moulds=rules.sample_design.output.moulds,
+        metrics=rules.summarise_evaluation.output.metrics,
+        weights=SURROGATE["weights"],
+    output:
+        png=report(
+            f"{RESULTS}/figures/worst.png",
+            caption="../report/plot_worst.rst",
+            category="Surrogate",
+        ),
+        svg=f"{RESULTS}/figures/worst.svg",
+        data=f"{RESULTS}/figures/worst.nc",
+    log:
+        f"{RESULTS}/logs/plot_worst.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_worst.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    script:
+        "../scripts/plot_worst.py"
+
+
+rule plot_models:
+    """Every model: training, cost, and errors in multiples of the noise floor."""
+    input:
+        table=rules.compare_models.output.table,
+        histories=expand(rules.assemble_model.output.history, model=MODELS),
+    output:
+        png=report(
+            f"{RESULTS}/figures/models.png",
+            caption="../report/plot_models.rst",
+            category="Surrogate",
+        ),
+        svg=f"{RESULTS}/figures/models.svg",
+        data=f"{RESULTS}/figures/models.csv",
+    log:
+        f"{RESULTS}/logs/plot_models.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_models.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    script:
+        "../scripts/plot_models.py"
 
 
 rule plot_tradeoff:

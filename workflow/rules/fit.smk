@@ -5,8 +5,8 @@ rule fit_tissue:
     """Fit the three parameters to a tissue by the surrogate; simulate it again at the fit."""
     input:
         mould=lambda wildcards: TISSUES[wildcards.tissue].mould,
-        weights=rules.train_surrogate.output.weights,
-        model=rules.train_surrogate.output.model,
+        weights=SURROGATE["weights"],
+        model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         fit=report(
@@ -20,7 +20,7 @@ rule fit_tissue:
         f"{RESULTS}/logs/fit_tissue/{{tissue}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/fit_tissue/{{tissue}}.tsv"
-    threads: CONFIG.surrogate.threads
+    threads: 2
     resources:
         mem_mb=2000,
     params:
@@ -30,7 +30,7 @@ rule fit_tissue:
         seed=CONFIG.seed,
         model=CONFIG.model.model_dump(mode="json"),
         accuracy=CONFIG.simulation.accuracy,
-        configuration=CONFIG.fingerprint("surrogate"),
+        configuration=CONFIG.model_fingerprint(CONFIG.surrogate.model),
     script:
         "../scripts/fit_tissue.py"
 
@@ -62,7 +62,7 @@ rule plot_fit:
         fit=rules.fit_tissue.output.fit,
         tissue=rules.fit_tissue.output.tissue,
         mould=rules.fit_tissue.input.mould,
-        weights=rules.train_surrogate.output.weights,
+        weights=SURROGATE["weights"],
     output:
         png=report(
             f"{RESULTS}/figures/fit_{{tissue}}.png",

@@ -1,41 +1,96 @@
-"""Training of the surrogate."""
+"""Training of the surrogate, and of what it is compared with."""
 
 
-rule train_surrogate:
-    """Train the surrogate; goes on from its checkpoint after an interruption."""
+def members(wildcards):
+    """Names of the members of a model."""
+    return range(MODELS[wildcards.model].members)
+
+
+rule train_member:
+    """Train one network of a model; goes on from its checkpoint after an interruption."""
     input:
         stack=rules.build_stack.output.stack,
+        extra=lambda wildcards: (
+            f"{RESULTS}/further/{MODELS[wildcards.model].extra}/fields.nc"
+            if MODELS[wildcards.model].extra
+            else []
+        ),
         examples=rules.augment_dataset.output.examples,
         normalisation=rules.augment_dataset.output.normalisation,
         checked=rules.check_dataset.output.checked,
     output:
-        weights=f"{MODEL}/weights.safetensors",
-        model=f"{MODEL}/model.json",
-        history=report(
-            f"{MODEL}/training.csv",
-            caption="../report/training_table.rst",
-            category="Surrogate",
-        ),
+        weights=f"{RESULTS}/surrogate/{{model}}/members/{{member}}/weights.safetensors",
+        model=f"{RESULTS}/surrogate/{{model}}/members/{{member}}/model.json",
+        history=f"{RESULTS}/surrogate/{{model}}/members/{{member}}/training.csv",
     log:
-        f"{RESULTS}/logs/train_surrogate.log",
+        f"{RESULTS}/logs/train_member/{{model}}/{{member}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/train_surrogate.tsv"
+        f"{RESULTS}/benchmarks/train_member/{{model}}/{{member}}.tsv"
     retries: 1
-    threads: CONFIG.surrogate.threads
+    threads: lambda wildcards: MODELS[wildcards.model].threads
     resources:
-        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        mem_mb=lambda wildcards, attempt: 5000 * attempt,
         runtime=lambda wildcards, attempt: 720 * attempt,
     params:
-        identity=CONFIG.fingerprint("surrogate"),
-        surrogate=CONFIG.surrogate.model_dump(mode="json"),
-        seed=CONFIG.seed,
+        identity=lambda wildcards: CONFIG.model_fingerprint(wildcards.model),
+        surrogate=lambda wildcards: MODELS[wildcards.model].model_dump(mode="json"),
+        seed=lambda wildcards: CONFIG.seed + int(wildcards.member),
         layers=CONFIG.model.layers,
         checkpoint=lambda wildcards, output: f"{Path(output.weights).parent}/checkpoint.pt",
     script:
-        "../scripts/train_surrogate.py"
+        "../scripts/train_member.py"
+
+
+rule assemble_model:
+    """Put the members of a model together, and calibrate their spread on the validation split."""
+    input:
+        stack=rules.build_stack.output.stack,
+        moulds=rules.sample_design.output.moulds,
+        weights=lambda wildcards: expand(
+            rules.train_member.output.weights,
+            member=members(wildcards),
+            allow_missing=True,
+        ),
+        models=lambda wildcards: expand(
+            rules.train_member.output.model,
+            member=members(wildcards),
+            allow_missing=True,
+        ),
+        histories=lambda wildcards: expand(
+            rules.train_member.output.history,
+            member=members(wildcards),
+            allow_missing=True,
+        ),
+    output:
+        weights=f"{RESULTS}/surrogate/{{model}}/weights.safetensors",
+        model=f"{RESULTS}/surrogate/{{model}}/model.json",
+        history=report(
+            f"{RESULTS}/surrogate/{{model}}/training.csv",
+            caption="../report/training_table.rst",
+            category="Surrogate",
+            labels={"model": "{model}", "what": "training"},
+        ),
+    log:
+        f"{RESULTS}/logs/assemble_model/{{model}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/assemble_model/{{model}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2500,
+    params:
+        seed=CONFIG.seed,
+    script:
+        "../scripts/assemble_model.py"
+
+
+# The model by which tissues are fitted and drawn.
+SURROGATE = {
+    name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate.model)[0]
+    for name in ("weights", "model", "history")
+}
 
 
 rule train:
-    """The trained surrogate."""
+    """Every model, trained."""
     input:
-        rules.train_surrogate.output,
+        expand(rules.assemble_model.output, model=MODELS),

@@ -6,7 +6,7 @@ rule measure_tradeoff:
     input:
         mould=lambda wildcards: CASES[wildcards.case].mould,
         surrogate=lambda wildcards: (
-            [rules.train_surrogate.output.weights, rules.train_surrogate.output.model]
+            [SURROGATE["weights"], SURROGATE["model"]]
             if CONFIG.comparison(CASES[wildcards.case])["surrogate"]
             else []
         ),

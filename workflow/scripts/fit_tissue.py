@@ -12,7 +12,7 @@ from raptor.fitting import Target, fit, measure_simulation, surrogate_measure, w
 from raptor.jobs import logged
 from raptor.moulds import read_mould
 from raptor.parameters import NetworkModel
-from raptor.surrogate.inference import load
+from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)

@@ -7,7 +7,7 @@ import torch
 from raptor.files import atomic_path
 from raptor.jobs import logged, progress
 from raptor.moulds import read_mould
-from raptor.surrogate.inference import load
+from raptor.surrogate.files import load
 from raptor.tradeoff import Case, Comparison, compare
 
 with logged(snakemake.log[0]):

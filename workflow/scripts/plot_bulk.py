@@ -12,7 +12,7 @@ from raptor.plotting import bulk_figure, save
 
 with logged(snakemake.log[0]):
     metrics = pd.read_csv(snakemake.input.metrics)
-    summary = json.loads(Path(snakemake.input.summary).read_text())
+    summary = json.loads(Path(snakemake.input.summary).read_text())["test"]
     save(bulk_figure(metrics, summary), Path(snakemake.output.png).with_suffix(""))
     columns = [f"{name}_{source}" for name in BULK for source in ("simulated", "predicted")]
     with atomic_path(Path(snakemake.output.data)) as path:

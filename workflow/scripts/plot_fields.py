@@ -8,7 +8,7 @@ from raptor.dataset.stack import read_samples, read_table
 from raptor.jobs import logged
 from raptor.moulds import moulds_by_id
 from raptor.plotting import fields_figure, save, save_fields
-from raptor.surrogate.inference import load
+from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):
     metrics = pd.read_csv(snakemake.input.metrics).sort_values("vrmse_density")

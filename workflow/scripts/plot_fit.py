@@ -9,7 +9,7 @@ from raptor.jobs import logged
 from raptor.morphology import density_threshold
 from raptor.moulds import read_mould
 from raptor.plotting import fit_figure, save, save_fields
-from raptor.surrogate.inference import load
+from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):
     fit = json.loads(Path(snakemake.input.fit).read_text())

@@ -14,6 +14,7 @@ from raptor.configuration.blocks import (
     Design,
     Fields,
     Fit,
+    Further,
     Model,
     Moulds,
     Name,
@@ -45,6 +46,11 @@ class Configuration(Block):
     fields: Fields = Field(default_factory=lambda: Fields())
     dataset: Dataset = Field(default_factory=lambda: Dataset())
     surrogate: Surrogate = Field(default_factory=lambda: Surrogate())
+    compared: dict[Name, dict[str, Any]] = Field(
+        {"pix2pix": {"network": "pix2pix", "beta1": 0.5}},
+        description="further models to compare: what surrogate is, but for the keys given, and one member",
+    )
+    further: Further = Field(default_factory=lambda: Further())
     fit: Fit = Field(default_factory=lambda: Fit())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
 
@@ -61,11 +67,18 @@ class Configuration(Block):
                 "device is cuda, where simulations are contracted at draft or standard; for accuracy: "
                 f"{self.simulation.accuracy} choose device: auto or cpu"
             )
-        if self.surrogate.pixels is not None and self.surrogate.pixels > self.fields.pixels:
-            raise ValueError(
-                f"surrogate.pixels is {self.surrogate.pixels}, more than fields.pixels "
-                f"({self.fields.pixels}); lower it, or leave it out"
-            )
+        for name, model in self.models.items():
+            if model.extra and not self.further.extra:
+                raise ValueError(
+                    f"{name}.extra is {model.extra}, of which there are no simulations; raise further.extra"
+                )
+            if model.extra and name == self.surrogate.model:
+                raise ValueError("surrogate.extra: the enriched set is chosen by surrogate; use compared")
+            if model.pixels is not None and model.pixels > self.fields.pixels:
+                raise ValueError(
+                    f"{name}.pixels is {model.pixels}, more than fields.pixels "
+                    f"({self.fields.pixels}); lower it, or leave it out"
+                )
         for pixels in self.tradeoff.pixels:
             if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
                 raise ValueError(
@@ -76,9 +89,38 @@ class Configuration(Block):
 
     @property
     def shards(self) -> list[str]:
-        """Names of the shards: the first and the last simulation of each."""
-        size, last = self.simulation.shard_size, self.design.simulations - 1
+        """Names of the design's shards."""
+        return self.shards_of(self.design.simulations)
+
+    def shards_of(self, simulations: int) -> list[str]:
+        """Names of the shards of so many simulations: the first and the last of each."""
+        size, last = self.simulation.shard_size, simulations - 1
         return [f"{i:05d}-{min(i + size - 1, last):05d}" for i in range(0, last + 1, size)]
+
+    @property
+    def models(self) -> dict[str, Surrogate]:
+        """Every model to be trained, by name: the surrogate first, then those compared with it."""
+        shared = self.surrogate.model_dump(mode="json") | {"members": 1}
+        found = {self.surrogate.model: self.surrogate}
+        for name, changes in self.compared.items():
+            if name in found:
+                raise ValueError(f"compared.{name} has the name of surrogate.model; choose another")
+            unknown = sorted(set(changes) - set(shared))
+            if unknown:
+                raise ValueError(
+                    f"compared.{name} has the key '{unknown[0]}'; allowed are the keys of surrogate"
+                )
+            found[name] = Surrogate.model_validate(shared | changes | {"model": name})
+        return found
+
+    @property
+    def further_sets(self) -> dict[str, int]:
+        """Simulations of each further set that is not empty, by name."""
+        f = self.further
+        repeated = min(f.floor, self.design.test)
+        sizes = {"floor": repeated * f.seeds, "bars": f.bars, "slender": f.slender, "corner": f.corner}
+        sizes |= dict.fromkeys(("enriched", "random"), f.extra)
+        return {name: size for name, size in sizes.items() if size}
 
     def network_model(self) -> NetworkModel:
         """The model of the simulations."""
@@ -120,17 +162,25 @@ class Configuration(Block):
         """Hash of the configuration that a stage's files depend on, model version included."""
         return content_hash(self._depends(stage))
 
+    def further_fingerprint(self, name: str) -> str:
+        """Hash of the configuration that a further set depends on."""
+        own = {"floor": self.further.seeds, "enriched": self.further.candidates}.get(name)
+        return content_hash([self._depends("dataset"), name, self.further_sets[name], own])
+
+    def model_fingerprint(self, name: str) -> str:
+        """Hash of the configuration that each member of a model depends on."""
+        model = self.models[name].model_dump(mode="json", exclude={"workers", "members"})
+        return content_hash([self._depends("dataset"), model])
+
     def _depends(self, stage: str) -> Any:
         dump = self.model_dump(mode="json")
         design = [self.seed, dump["design"], dump["moulds"], self.model.layers, MODEL_VERSION]
         simulation = [design, dump["model"], self.simulation.accuracy]
         dataset = [simulation, dump["fields"], STACK_FORMAT]
-        surrogate = [dataset, self.surrogate.model_dump(mode="json", exclude={"workers"})]
         stages = {
             "design": design,
             "simulation": simulation,
             "dataset": dataset,
-            "surrogate": surrogate,
         }
         return stages[stage]
 

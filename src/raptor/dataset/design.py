@@ -81,7 +81,7 @@ def sample_design(rules: DesignRules, moulds: RandomMoulds, seed: int) -> tuple[
         stream = np.random.SeedSequence([seed, 0, simulation])
         shape, values, run_seed = stream.spawn(3)
         mould = moulds.draw(np.random.default_rng(shape), f"m{simulation:05d}")
-        parameters = _draw_parameters(rules, bool(edge[simulation]), np.random.default_rng(values))
+        parameters = draw_parameters(rules, np.random.default_rng(values), edge=bool(edge[simulation]))
         number = int(run_seed.generate_state(1, np.uint64)[0] >> np.uint64(11))
         runs.append(
             Run(
@@ -108,8 +108,14 @@ def _splits(rules: DesignRules, rng: Generator) -> list[str]:
     return [str(name) for name in names]
 
 
-def _draw_parameters(rules: DesignRules, edge: bool, rng: Generator) -> CellParameters:
-    """Delta uniform, or at an end; both kappas uniform over the bounded region (paper)."""
+def draw_parameters(rules: DesignRules, rng: Generator, *, edge: bool = False) -> CellParameters:
+    """Delta uniform, or at an end; both kappas uniform over the bounded region (paper).
+
+    Raises
+    ------
+    RaptorError
+        Where the ranges allow no kappa_nnnn <= kappa_nnn/sqrt(2).
+    """
     delta = rng.uniform(rules.delta.lower, rules.delta.upper)
     if edge:
         delta = rules.delta.lower if rng.random() < 0.5 else rules.delta.upper

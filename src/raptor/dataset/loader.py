@@ -1,6 +1,8 @@
-"""Examples for torch: read lazily from the stack, transformed and scaled."""
+"""Examples for torch: read lazily from stacks, transformed and scaled."""
 
 import os
+from bisect import bisect_right
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -18,25 +20,32 @@ from raptor.symmetry import Element, apply, move_pixels
 class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
     """Pairs of inputs (5, y, x) and targets (8, y, x), both scaled, float32.
 
-    The stack is opened on first use, by each process that reads for itself, and read one sample at a
-    time: what is in memory does not grow with the stack.
+    Stacks are opened on first use, by each process that reads for itself, and read one sample at a
+    time: what is in memory does not grow with them. Rows of several are counted through.
 
     Raises
     ------
     RaptorError
-        Where the stack cannot be read.
+        Where a stack cannot be read.
     """
 
     def __init__(
-        self, stack: Path, examples: list[Example], scaling: Scaling, pixels: int | None = None
+        self,
+        stacks: Path | Sequence[Path],
+        examples: list[Example],
+        scaling: Scaling,
+        pixels: int | None = None,
     ) -> None:
-        table = read_table(stack)
-        self.stack = Path(stack)
+        self.stacks = [stacks] if isinstance(stacks, Path) else list(stacks)
+        tables = [read_table(stack) for stack in self.stacks]
+        self.starts = [0]
+        for table in tables[:-1]:
+            self.starts.append(self.starts[-1] + len(table.parameters))
         self.examples = examples
         self.scaling = scaling
-        self.pixels = pixels or table.pixels
-        self.parameters = table.parameters
-        self._file: h5py.File | None = None
+        self.pixels = pixels or tables[0].pixels
+        self.parameters = [values for table in tables for values in table.parameters]
+        self._files: list[h5py.File] = []
         self._reader = 0
 
     def __len__(self) -> int:
@@ -44,21 +53,22 @@ class ExampleSet(Dataset[tuple[Tensor, Tensor]]):
 
     def __getstate__(self) -> dict[str, object]:
         """Without the open file, so that a worker may be started by any means."""
-        return vars(self) | {"_file": None}
+        return vars(self) | {"_files": []}
 
-    def _open(self) -> h5py.File:
-        """The stack, opened by this process: HDF5 must not share a file with a parent that forked."""
-        if self._file is None or self._reader != os.getpid():
-            self._file, self._reader = h5py.File(self.stack, "r"), os.getpid()
-        return self._file
+    def _open(self) -> list[h5py.File]:
+        """The stacks, opened by this process: HDF5 must not share a file with a parent that forked."""
+        if not self._files or self._reader != os.getpid():
+            self._files, self._reader = [h5py.File(stack, "r") for stack in self.stacks], os.getpid()
+        return self._files
 
     def sample(self, row: int, element: Element | None = None) -> tuple[Tensor, Tensor]:
-        """Scaled inputs (5, y, x) and targets (8, y, x) of a row of the stack, moved by an element of D4."""
+        """Scaled inputs (5, y, x) and targets (8, y, x) of a row, moved by an element of D4."""
         element = element or Element(0, mirror=False)
-        file = self._open()
-        depression, tethers = (move_pixels(file[name][row], element) for name in ("depression", "tethers"))
+        number = bisect_right(self.starts, row) - 1
+        file, local = self._open()[number], row - self.starts[number]
+        depression, tethers = (move_pixels(file[name][local], element) for name in ("depression", "tethers"))
         inputs = scale_inputs(depression, tethers, self.parameters[row])
-        target = self.scaling.forward(apply(file["fields"][row], element))
+        target = self.scaling.forward(apply(file["fields"][local], element))
         return pooled(torch.from_numpy(inputs), self.pixels), pooled(torch.from_numpy(target), self.pixels)
 
     def __getitem__(self, number: int) -> tuple[Tensor, Tensor]:

@@ -1,4 +1,4 @@
-"""Batches of examples for training: kept on a GPU where they fit, else read ahead of it."""
+"""Batches of examples for training: kept in memory where they fit, else read ahead of the network."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -10,6 +10,7 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import INPUTS
 from raptor.symmetry import FIELDS, Element
 
+ROOM = 3 * 2**30  # bytes of the processor's memory that samples may take
 Batches = Iterable[tuple[Tensor, Tensor]]
 
 
@@ -32,12 +33,10 @@ def samples_of(dataset: ExampleSet) -> list[int]:
 
 
 def fit_on(device: torch.device, datasets: Sequence[ExampleSet]) -> bool:
-    """Whether all samples of some sets take no more than half of a GPU's free memory."""
-    if device.type != "cuda":
-        return False
+    """Whether all samples of some sets fit in half of a GPU's free memory, or `ROOM` of the processor's."""
+    room = 0.5 * torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else ROOM
     numbers = sum(len(samples_of(dataset)) * dataset.pixels**2 for dataset in datasets)
-    size = 4 * (len(INPUTS) + len(FIELDS)) * numbers
-    return bool(size < 0.5 * torch.cuda.mem_get_info(device)[0])
+    return bool(4 * (len(INPUTS) + len(FIELDS)) * numbers < room)
 
 
 class Feeder:

@@ -1,49 +1,96 @@
-"""Prediction: from a mould and parameters to the eight fields, in physical units."""
+"""Prediction: from a mould and parameters to the eight fields, and how far to trust them."""
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import load_file, save_file
 from torch import Tensor
+from torch.nn.functional import interpolate
 
-from raptor import MODEL_VERSION
 from raptor.condor.lattice import cast_sites
-from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.errors import RaptorError
-from raptor.files import atomic_path
 from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image, pixel_centres
+from raptor.moulds.raster import MouldImage, mould_image
 from raptor.parameters import CellParameters
 from raptor.resolution import pooled, refined
-from raptor.surrogate.feeding import apply
+from raptor.surrogate.calibration import Bands, Calibration
+from raptor.surrogate.feeding import apply, move_pixels
 from raptor.surrogate.networks import Architecture, Generator
-from raptor.surrogate.physics import average, project
-from raptor.symmetry import FIELDS, Element, move_pixels
+from raptor.surrogate.novelty import descriptors
+from raptor.surrogate.physics import average, project, signed, unsigned
+from raptor.symmetry import FIELDS, Element
 
 BATCH = 16
 
 
 @dataclass(frozen=True)
-class Surrogate:
-    """A trained generator with what is needed to use it without its data set.
+class Prediction:
+    """One tissue, predicted.
 
-    `pixels` is the side of the images that it predicts, of which the network may see means over squares.
+    Parameters
+    ----------
+    fields : ndarray (8, y, x)
+        In physical units, per pixel.
+    shape : ndarray (2,)
+        A/A0 and w/w0.
+    field_bands : Bands
+        Half widths (levels, 8, y, x) of the calibrated bands about the fields.
+    shape_bands : Bands
+        Half widths (levels, 2) of those about A/A0 and w/w0.
+    disagreement, distance : float
+        How far the networks disagree, and how far the input is from the training set, both over what all but
+        a hundredth of the validation samples stay below.
     """
 
-    generator: Generator
+    fields: NDArray[np.float32]
+    shape: NDArray[np.float64]
+    field_bands: Bands
+    shape_bands: Bands
+    disagreement: float
+    distance: float
+
+    @property
+    def unlike(self) -> bool:
+        """Whether the input is unlike the training set, or the networks disagree more than they should."""
+        return bool(max(self.disagreement, self.distance) > 1)
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """Trained networks with what is needed to use them without their data set.
+
+    Parameters
+    ----------
+    members : tuple of Generator
+        Trained alike, from seeds of their own; predictions are their mean.
+    pixels : int
+        Side of the images that are predicted, of which networks may see means over squares.
+    calibration : Calibration or None
+        How errors follow from the spread of the members, where that was measured.
+    """
+
+    members: tuple[Generator, ...]
     architecture: Architecture
     scaling: Scaling
     layers: int
     pixels: int
+    calibration: Calibration | None = None
+
+    @cached_property
+    def threshold(self) -> float:
+        """Density per pixel above which there is tissue."""
+        return density_threshold(self.layers, self.pixels)
+
+    @property
+    def weights(self) -> int:
+        """Numbers that training chose, of one member."""
+        return sum(parameter.numel() for parameter in self.members[0].parameters())
 
     def predict(
         self,
@@ -69,39 +116,13 @@ class Surrogate:
         RaptorError
             Where the masks have another size than the network, or parameters are out of its range.
         """
-        pixels = self.pixels
-        if depression.shape != (pixels, pixels):
-            raise RaptorError(f"masks are {depression.shape}; this model takes {pixels} x {pixels} pixels")
-        for values in parameters:
-            values.require_sampled("prediction")
-        if not parameters:
-            return np.empty((0, len(FIELDS), pixels, pixels), np.float32)
-        elements = Element.all() if averaged else Element.all()[:1]
-        images = [
-            scale_inputs(move_pixels(depression, element), move_pixels(tethers, element), values)
-            for values in parameters
-            for element in elements
-        ]
-        self.generator.eval()
-        with torch.no_grad():
-            parts = [
-                self._evaluated(torch.from_numpy(np.stack(images[start : start + BATCH])), cells)
-                for start in range(0, len(images), BATCH)
-            ]
-            of_each = torch.split(torch.cat(parts), len(elements))
-            fields = torch.stack([_averaged(part, elements) if averaged else part[0] for part in of_each])
-            if self.generator.physical is None or self.architecture.pixels < pixels:
-                masks = torch.from_numpy(depression.astype(np.float32)).expand(len(fields), 1, -1, -1)
-                fields = project(fields, masks, torch.full((len(fields),), float(cells)))
-        return np.asarray(fields.numpy(), dtype=np.float32)
-
-    def _evaluated(self, inputs: Tensor, cells: int) -> Tensor:
-        """Fields in physical units, for scaled inputs, as the network gives them."""
-        seen = self.architecture.pixels
-        # Fields are in the unit of a fine pixel, of which a coarse one is the mean.
-        counts = torch.full((len(inputs),), cells * (seen / self.pixels) ** 2)
-        scaled = self.generator(pooled(inputs, seen), counts)
-        return torch.from_numpy(self.scaling.inverse(refined(scaled, self.pixels).numpy()))
+        masks = self._masks(depression, tethers, parameters)
+        fine = np.empty((len(parameters), len(FIELDS), self.pixels, self.pixels), np.float32)
+        for start in range(0, len(parameters), BATCH):
+            part = parameters[start : start + BATCH]
+            images = self._images(masks, part, cells, averaged)
+            fine[start : start + BATCH] = self._fine(_means(images), masks, cells).numpy()
+        return fine
 
     def predict_mould(
         self, mould: Mould, parameters: CellParameters, *, averaged: bool = True
@@ -118,96 +139,112 @@ class Surrogate:
         fields = self.predict(image.depression, image.tethers, [parameters], cells, averaged=averaged)
         return np.asarray(fields[0])
 
+    def examine(self, mould: Mould, parameters: CellParameters) -> Prediction:
+        """Predict a mould's tissue with its calibrated bands, and say whether it is unlike the training set.
 
-def _averaged(fields: Tensor, elements: Sequence[Element]) -> Tensor:
-    """Mean (8, y, x) of predictions (elements, 8, y, x) of a mould's images, each moved back."""
-    back = [apply(image, element.inverse) for image, element in zip(fields, elements, strict=True)]
-    return average(torch.stack(back))
-
-
-def save(
-    folder: Path,
-    weights: dict[str, Tensor],
-    architecture: Architecture,
-    scaling: Scaling,
-    layers: int,
-    pixels: int,
-    description: dict[str, Any],
-    identity: str,
-) -> None:
-    """Write weights.safetensors and model.json; `identity` of the training stands in both."""
-    with atomic_path(folder / "weights.safetensors") as temporary:
-        save_file(
-            {name: value.contiguous() for name, value in weights.items()},
-            temporary,
-            metadata={"identity": identity},
+        Raises
+        ------
+        RaptorError
+            As `predict_mould`, and where the surrogate is not calibrated.
+        """
+        if self.calibration is None:
+            raise RaptorError(
+                "this model's errors were not calibrated, so it cannot say how far to trust a prediction; "
+                "use the model that the workflow's rule assemble_model wrote"
+            )
+        image, cells = mould_image(mould, self.pixels), len(cast_sites(mould, self.layers))
+        fields, spread, shapes = self.ensemble(image, mould, parameters, cells)
+        calibration = self.calibration
+        seen = descriptors(image.depression, image.tethers, parameters)
+        return Prediction(
+            fields,
+            self.shape(fields, image, mould),
+            calibration.fields.bands(spread, np.abs(fields[:1])),
+            calibration.shapes.bands(deviation(shapes), np.ones(2)),
+            calibration.disagreement_of(spread, fields),
+            calibration.novelty.distance(seen),
         )
-    content = {
-        **description,
-        "identity": identity,
-        "architecture": architecture.as_json(),
-        "normalisation": scaling.as_json(),
-        "layers": layers,
-        "pixels": pixels,
-        "model_version": MODEL_VERSION,
-    }
-    with atomic_path(folder / "model.json") as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+    def ensemble(
+        self, image: MouldImage, mould: Mould, parameters: CellParameters, cells: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]:
+        """Mean fields (8, y, x), their spread over members and images, and members' shapes (n, 2)."""
+        masks = self._masks(image.depression, image.tethers, [parameters])
+        images = self._images(masks, [parameters], cells, averaged=True)[0]
+        of_members = images.reshape(len(self.members), -1, *images.shape[1:])
+        means = torch.cat([_means(images[None]), _means(of_members)])
+        fine = self._fine(means, masks, cells).numpy()
+        spread = unsigned(images).std(dim=0, correction=1)
+        wide = interpolate(spread[None], size=2 * (self.pixels,), mode="bilinear")[0].numpy()
+        return fine[0], wide, np.array([self.shape(fields, image, mould) for fields in fine[1:]])
+
+    def shape(self, fields: NDArray[np.floating], image: MouldImage, mould: Mould) -> NDArray[np.float64]:
+        """A/A0 and w/w0 of fields (8, y, x), (2,)."""
+        ratios = (
+            area_ratio(fields[0], image, self.threshold),
+            width_ratio(fields[0], mould, self.threshold),
+        )
+        return np.array(ratios)
+
+    def _masks(
+        self, depression: NDArray[Any], tethers: NDArray[Any], parameters: Sequence[CellParameters]
+    ) -> Tensor:
+        """Both masks as one tensor (2, y, x), parameters and sizes being allowed."""
+        if depression.shape != (self.pixels, self.pixels):
+            raise RaptorError(
+                f"masks are {depression.shape}; this model takes {self.pixels} x {self.pixels} pixels"
+            )
+        for values in parameters:
+            values.require_sampled("prediction")
+        return torch.from_numpy(np.stack([depression, tethers]).astype(np.float32))
+
+    def _images(
+        self, masks: Tensor, parameters: Sequence[CellParameters], cells: int, averaged: bool
+    ) -> Tensor:
+        """What each member says of each image under D4, moved back: (n, members * images, 8, y', x').
+
+        In physical units, on the raster that networks see.
+        """
+        seen = self.architecture.pixels
+        elements = Element.all() if averaged else Element.all()[:1]
+        coarse = pooled(masks, seen)
+        moved = [move_pixels(coarse, element).numpy() for element in elements]
+        scaled_inputs = [
+            scale_inputs(depression, tethers, values)
+            for values in parameters
+            for depression, tethers in moved
+        ]
+        inputs = torch.from_numpy(np.stack(scaled_inputs))
+        # Fields are in the unit of a fine pixel, of which a coarse one is the mean.
+        counts = torch.full((len(inputs),), cells * (seen / self.pixels) ** 2)
+        answers = []
+        with torch.no_grad():
+            for member in self.members:
+                member.eval()
+                parts = zip(torch.split(inputs, BATCH), torch.split(counts, BATCH), strict=True)
+                scaled = torch.cat([member(*part) for part in parts]).float()
+                fields = torch.from_numpy(self.scaling.inverse(scaled.numpy()))
+                of_each = fields.reshape(len(parameters), len(elements), *fields.shape[1:])
+                back = [apply(of_each[:, i], element.inverse) for i, element in enumerate(elements)]
+                answers.append(torch.stack(back, dim=1))
+        return torch.cat(answers, dim=1)
+
+    def _fine(self, means: Tensor, masks: Tensor, cells: int) -> Tensor:
+        """Fields (n, 8, y, x) of the whole raster, obeying the physics, from means (n, 8, y', x')."""
+        fields = signed(refined(means, self.pixels))
+        if self.members[0].physical is not None and self.architecture.pixels == self.pixels:
+            return fields
+        depression = masks[:1].expand(len(fields), 1, -1, -1)
+        return project(fields, depression, torch.full((len(fields),), float(cells)))
 
 
-def load(folder: Path) -> Surrogate:
-    """Load a model from its folder.
-
-    Raises
-    ------
-    RaptorError
-        Where a file is missing or cut short, or the weights do not fit the model.
-    """
-    folder = Path(folder)
-    try:
-        content = json.loads((folder / "model.json").read_text())
-        architecture = Architecture(**content["architecture"])
-        scaling = Scaling.from_json(content["normalisation"])
-        layers, pixels = int(content["layers"]), int(content["pixels"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RaptorError(f"{folder / 'model.json'} cannot be read: {error}") from error
-    generator = Generator(architecture, scaling)
-    try:
-        weights = folder / "weights.safetensors"
-        with safe_open(weights, framework="pt") as file:
-            identity = (file.metadata() or {}).get("identity")
-        if identity != content.get("identity"):
-            raise RuntimeError("they are of two trainings")
-        generator.load_state_dict(load_file(weights))
-    except (OSError, SafetensorError) as error:
-        raise RaptorError(f"{folder / 'weights.safetensors'} cannot be read: {error}") from error
-    except RuntimeError as error:
-        raise RaptorError(
-            f"{folder / 'weights.safetensors'} does not fit the model that model.json describes; "
-            f"keep the two files of one training together ({str(error).splitlines()[0]})"
-        ) from error
-    generator.eval()
-    return Surrogate(generator, architecture, scaling, layers, pixels)
+def _means(images: Tensor) -> Tensor:
+    """Means (n, 8, y, x) of predictions (n, images, 8, y, x) of each of n tissues."""
+    return torch.stack([average(of_each) for of_each in images])
 
 
-def write_prediction(
-    path: Path, surrogate: Surrogate, mould: Mould, parameters: CellParameters
-) -> tuple[float, float]:
-    """Predict a mould's fields and write them, in physical units; returns A/A0 and w/w0."""
-    fields = surrogate.predict_mould(mould, parameters)
-    pixels = fields.shape[-1]
-    threshold = density_threshold(surrogate.layers, pixels)
-    area = area_ratio(fields[0], mould_image(mould, pixels), threshold)
-    width = width_ratio(fields[0], mould, threshold)
-    with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
-        for name, size in (("sample", 1), ("field", len(FIELDS)), ("y", pixels), ("x", pixels)):
-            file.createDimension(name, size)
-        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
-        for axis in "yx":
-            variable(file, axis, (axis,), pixel_centres(pixels), f"pixel centre {axis}, in l0")
-        variable(file, "fields", ("sample", "field", "y", "x"), fields[None], "fields, per pixel")
-        for name, value in asdict(parameters).items():
-            variable(file, name, ("sample",), [value], name)
-        variable(file, "area_ratio", ("sample",), [area], "A/A0")
-        variable(file, "width_ratio", ("sample",), [width], "w/w0")
-    return area, width
+def deviation(shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation (2,) over members (n, 2); 0 of a single one."""
+    if len(shapes) < 2:
+        return np.zeros(2)
+    return np.asarray(np.nan_to_num(shapes.std(axis=0, ddof=1)))

@@ -6,36 +6,52 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, l1_loss
 
-from raptor.surrogate.physics import unsigned
+from raptor.surrogate.physics import SMALL, unsigned
+
+LOSSES = ("l1", "relative")
+QUIET = 0.1  # part of the batch's variance that is added to each sample's: nothing is divided by noise
 
 
 @dataclass(frozen=True)
 class GeneratorLoss:
-    """weight * adversarial + lambda_l1 * l1, and its parts."""
+    """weight * adversarial + factor * distance, and its parts."""
 
     total: Tensor
     adversarial: Tensor
-    l1: Tensor
+    distance: Tensor
 
 
 def generator_loss(
     logits_of_prediction: Tensor | None,
     prediction: Tensor,
     target: Tensor,
-    lambda_l1: float,
+    factor: float,
     weight: float = 1.0,
+    loss: str = "l1",
 ) -> GeneratorLoss:
     """Fool the discriminator, with a weight, and be close to the target; without logits, only that.
 
     sxsz and sysz are compared by magnitude where nobody judges: their sign is spontaneous, and who is asked
     for it learns to say zero.
     """
+    distance_of = l1_loss if loss == "l1" else relative_distance
     if logits_of_prediction is None:
-        l1 = l1_loss(unsigned(prediction), unsigned(target))
-        return GeneratorLoss(lambda_l1 * l1, torch.zeros_like(l1), l1)
+        distance = distance_of(unsigned(prediction), unsigned(target))
+        return GeneratorLoss(factor * distance, torch.zeros_like(distance), distance)
     adversarial = _towards(logits_of_prediction, real=True)
-    l1 = l1_loss(prediction, target)
-    return GeneratorLoss(weight * adversarial + lambda_l1 * l1, adversarial, l1)
+    distance = distance_of(prediction, target)
+    return GeneratorLoss(weight * adversarial + factor * distance, adversarial, distance)
+
+
+def relative_distance(prediction: Tensor, target: Tensor) -> Tensor:
+    """Mean over samples and fields (n, 8, y, x) of the root mean square error over the target's deviation.
+
+    Of each sample and field as its VRMSE counts them, so that none is drowned by others; the relative L2
+    loss of the neural-operator literature (Li et al. 2021, arXiv:2010.08895), about the mean.
+    """
+    error = ((prediction - target) ** 2).mean((2, 3))
+    variance = target.var((2, 3), correction=0)
+    return torch.sqrt((error + SMALL) / (variance + QUIET * variance.mean(0) + SMALL)).mean()
 
 
 def discriminator_loss(logits_of_target: Tensor, logits_of_prediction: Tensor) -> Tensor:

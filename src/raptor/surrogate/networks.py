@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from types import MethodType
 from typing import Any
 
 import torch
@@ -10,11 +11,14 @@ from torch import Tensor, nn
 
 from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.errors import RaptorError
-from raptor.surrogate.compact import CompactUNet
+from raptor.surrogate.compact import MASKS, CompactUNet, ModulatedNorm, ParameterEmbedding
 from raptor.surrogate.physics import PhysicalFields
 from raptor.symmetry import FIELDS
 
-NETWORKS = ("pix2pix", "compact")
+NETWORKS = ("pix2pix", "modulated", "compact", "fno")
+PHYSICAL = ("compact", "fno")  # obey the physics by construction; the others are projected
+ENOUGH = 64  # pixels that show fields without loss to speak of (docs/surrogate.md)
+MODES = 12  # Fourier modes that a neural operator keeps along each axis
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,9 @@ class Architecture:
         Strided layers of the discriminator, fewer on images below 32 pixels: 3 see patches of 70 x
         70 pixels.
     network : str
-        "pix2pix", the published U-Net, or "compact", whose outputs obey the physics.
+        "pix2pix", the published U-Net; "modulated", the same with parameters that scale and shift its
+        features; "compact", a residual U-Net, or "fno", a Fourier neural operator, whose outputs obey the
+        physics by construction.
     """
 
     pixels: int
@@ -56,32 +62,42 @@ class Architecture:
 def architecture_of(settings: Mapping[str, Any], pixels: int) -> Architecture:
     """The architecture that a configuration's block `surrogate` asks for, of images of so many pixels."""
     names = ("base_channels", "dropout", "patch_layers", "network")
-    return Architecture(settings["pixels"] or pixels, **{name: settings[name] for name in names})
+    seen = settings["pixels"] or min(ENOUGH, pixels)
+    return Architecture(seen, **{name: settings[name] for name in names})
 
 
 class _Down(nn.Sequential):
     """Halve the image: strided convolution, normalisation where there is something to average."""
 
-    def __init__(self, before: int, after: int, normalise: bool, activate: bool = True) -> None:
+    def __init__(
+        self, before: int, after: int, normalise: bool, activate: bool = True, modulated: bool = False
+    ) -> None:
         layers: list[nn.Module] = [nn.LeakyReLU(0.2)] if activate else []
         layers.append(nn.Conv2d(before, after, 4, stride=2, padding=1, bias=not normalise))
         if normalise:
-            layers.append(nn.BatchNorm2d(after))
+            layers.append(ModulatedNorm(after) if modulated else nn.BatchNorm2d(after))
         super().__init__(*layers)
 
 
 class _Up(nn.Sequential):
     """Double the image: transposed convolution, normalisation, dropout in the deepest layers."""
 
-    def __init__(self, before: int, after: int, dropout: float) -> None:
+    def __init__(self, before: int, after: int, dropout: float, modulated: bool = False) -> None:
         layers: list[nn.Module] = [
             nn.ReLU(),
             nn.ConvTranspose2d(before, after, 4, stride=2, padding=1, bias=False),
-            nn.BatchNorm2d(after),
+            ModulatedNorm(after) if modulated else nn.BatchNorm2d(after),
         ]
         if dropout > 0:
             layers.append(nn.Dropout(dropout))
         super().__init__(*layers)
+
+
+def _through(layers: nn.Module, features: Tensor, embedded: Tensor | None) -> Tensor:
+    """Features after layers, of which some are modulated."""
+    for layer in layers.children():
+        features = layer(features, embedded) if isinstance(layer, ModulatedNorm) else layer(features)
+    return features
 
 
 class Generator(nn.Module):
@@ -89,9 +105,8 @@ class Generator(nn.Module):
 
     def __init__(self, architecture: Architecture, scaling: Scaling) -> None:
         super().__init__()
-        compact = architecture.network == "compact"
-        self.network = CompactUNet(architecture.base_channels) if compact else UNet(architecture)
-        self.physical = PhysicalFields(scaling) if compact else None
+        self.network = _network(architecture)
+        self.physical = PhysicalFields(scaling) if architecture.network in PHYSICAL else None
 
     def forward(self, inputs: Tensor, cells: Tensor) -> Tensor:
         """Fields (n, 8, y, x) of inputs (n, 5, y, x) and numbers of cells (n,)."""
@@ -102,37 +117,65 @@ class Generator(nn.Module):
         return fields
 
 
+def _network(architecture: Architecture) -> nn.Module:
+    """From scaled inputs (n, 5, y, x) to eight channels (n, 8, y, x)."""
+    if architecture.network == "compact":
+        return CompactUNet(architecture.base_channels)
+    if architecture.network == "fno":
+        from neuralop.models import FNO  # here: other networks need not wait for it
+
+        modes = min(MODES, architecture.pixels // 2)
+        operator: nn.Module = FNO(
+            n_modes=(modes, modes),
+            in_channels=len(INPUTS),
+            out_channels=len(FIELDS),
+            hidden_channels=architecture.base_channels,
+        )
+        # The library's own adds what is no tensor, which neither checkpoints nor safetensors take.
+        operator.state_dict = MethodType(nn.Module.state_dict, operator)  # type: ignore[method-assign]
+        return operator
+    return UNet(architecture)
+
+
 class UNet(nn.Module):
-    """pix2pix' U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled."""
+    """pix2pix' U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled.
+
+    Where it is modulated, parameters scale and shift its normalised features, and the network sees the
+    masks alone.
+    """
 
     def __init__(self, architecture: Architecture) -> None:
         super().__init__()
         depth = int(math.log2(architecture.pixels))
         channels = [architecture.base_channels * min(2**level, 8) for level in range(depth)]
+        modulated = architecture.network == "modulated"
+        self.embed = ParameterEmbedding() if modulated else None
+        self.seen = MASKS if modulated else len(INPUTS)
         self.down = nn.ModuleList()
         for level, after in enumerate(channels):
-            before = channels[level - 1] if level else len(INPUTS)
+            before = channels[level - 1] if level else self.seen
             inner = 0 < level < depth - 1
-            self.down.append(_Down(before, after, normalise=inner, activate=level > 0))
+            self.down.append(_Down(before, after, normalise=inner, activate=level > 0, modulated=modulated))
         self.up = nn.ModuleList()
         for level in range(depth - 1, 0, -1):
             before = channels[level] * (1 if level == depth - 1 else 2)
             dropout = architecture.dropout if level >= depth - 3 else 0.0
-            self.up.append(_Up(before, channels[level - 1], dropout))
+            self.up.append(_Up(before, channels[level - 1], dropout, modulated))
         self.last = nn.Sequential(
             nn.ReLU(), nn.ConvTranspose2d(2 * channels[0], len(FIELDS), 4, stride=2, padding=1)
         )
 
     def forward(self, inputs: Tensor) -> Tensor:
         """Predict scaled fields. The last layer is linear: fields of new moulds may exceed 1."""
+        embedded = None if self.embed is None else self.embed(inputs)
         skips = []
-        features = inputs
+        features = inputs[:, : self.seen]
         for down in self.down:
-            features = down(features)
+            features = _through(down, features, embedded)
             skips.append(features)
         features = skips.pop()
         for up in self.up:
-            features = torch.cat([up(features), skips.pop()], dim=1)
+            features = torch.cat([_through(up, features, embedded), skips.pop()], dim=1)
         return self.last(features)  # type: ignore[no-any-return]
 
 

@@ -19,6 +19,7 @@ from raptor.symmetry import FIELDS
 SMALL = 1e-12
 ROUNDING = 1e-5
 XX, YY, ZZ, XY, XZ, YZ = (FIELDS.index(name) for name in ("sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz"))
+ROWS = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
 
 
 def reachable(depression: Tensor) -> Tensor:
@@ -77,37 +78,61 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
     image, y, x = torch.nonzero(density[:, 0], as_tuple=True)  # the tensor is zero elsewhere
     found = fields[image, :, y, x]
-    rows = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
-    tensor = found[:, rows].double()
-    size = tensor.abs().amax((1, 2), keepdim=True).clamp(min=SMALL)  # tiny ones would not converge
-    values, vectors = torch.linalg.eigh(tensor / size)
-    values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
-    values = values * (density[image, 0, y, x] / values.sum(1))[:, None]
-    tensor = ((vectors * values[:, None, :]) @ vectors.transpose(1, 2)).to(fields.dtype)
+    wanted = density[image, 0, y, x]
+    tensor = found[:, ROWS]
+    trace = tensor.diagonal(dim1=1, dim2=2).sum(1)
+    # Few pixels need their eigenvalues known, and these cost more than all else.
+    doubtful = ~_is_positive(found) | (trace <= SMALL)
+    mended = _positive(tensor[doubtful], wanted[doubtful])
+    tensor = tensor * (wanted / trace.clamp(min=SMALL))[:, None, None]
+    tensor[doubtful] = mended
     obeying = torch.cat([density, fields[:, 1:2] * there, torch.zeros_like(fields[:, 2:])], dim=1)
     for channel, (i, j) in {XX: (0, 0), YY: (1, 1), ZZ: (2, 2), XY: (0, 1), XZ: (0, 2), YZ: (1, 2)}.items():
         obeying[image, channel, y, x] = tensor[:, i, j]
     return obeying
 
 
-def average(fields: Tensor) -> Tensor:
-    """Mean (8, y, x) of predictions (n, 8, y, x) of one tissue, in physical units.
+def _is_positive(found: Tensor) -> Tensor:
+    """Whether tensors, in fields (n, 8), are positive semi-definite, by their principal minors, (n,)."""
+    xx, yy, zz, xy, xz, yz = (found[:, channel].double() for channel in (XX, YY, ZZ, XY, XZ, YZ))
+    minors = (xx * yy - xy**2, xx * zz - xz**2, yy * zz - yz**2)
+    determinant = xx * minors[2] - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    least = torch.stack([xx, yy, zz, *minors, determinant])
+    return torch.amin(least, dim=0) >= 0
 
-    All fields are linear but (sxsz, sysz), whose signs mean nothing: of them magnitudes are averaged, which
-    D4 moves like any image, shortened where the tensor would not stay positive; sxsz is then positive, and
-    sysz has the sign of sxsy. What obeys the physics before does so after.
+
+def _positive(tensor: Tensor, trace: Tensor) -> Tensor:
+    """Tensors (n, 3, 3) without their negative eigenvalues, of a given trace (n,)."""
+    size = tensor.abs().amax((1, 2), keepdim=True).clamp(min=SMALL)  # tiny ones would not converge
+    values, vectors = torch.linalg.eigh((tensor / size).double())
+    values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
+    values = values * (trace / values.sum(1))[:, None]
+    return ((vectors * values[:, None, :]) @ vectors.transpose(1, 2)).to(tensor.dtype)
+
+
+def average(fields: Tensor) -> Tensor:
+    """Mean (8, y, x) of predictions (n, 8, y, x) of one tissue, sxsz and sysz by magnitude.
+
+    Their signs mean nothing, and magnitudes are what D4 moves like any image; `signed` gives signs back.
     """
-    mean = fields.mean(0)
-    x, y = fields[:, XZ].abs().mean(0), fields[:, YZ].abs().mean(0)
-    y = torch.where(mean[XY] < 0, -y, y)
+    return unsigned(fields).mean(0)
+
+
+def signed(fields: Tensor) -> Tensor:
+    """Means (n, 8, y, x) of predictions with signs: sxsz positive, sysz with the sign of sxsy.
+
+    Both are shortened where the tensor would not stay positive: what obeys the physics before it was
+    averaged does so after.
+    """
+    x, y = (fields[:, channel].clamp(min=0.0) for channel in (XZ, YZ))
+    y = torch.where(fields[:, XY] < 0, -y, y)
     # v v^T <= szz A with A the tensor in the plane, or v^T adj(A) v <= szz det(A).
-    a, b, c = mean[XX], mean[XY], mean[YY]
+    a, b, c = fields[:, XX], fields[:, XY], fields[:, YY]
     # A tensor of few directions has next to no determinant, and rounding must not decide.
-    room = mean[ZZ].clamp(min=0.0) * ((a * c - b * b).clamp(min=0.0) + ROUNDING * (a * c).abs())
+    room = fields[:, ZZ].clamp(min=0.0) * ((a * c - b * b).clamp(min=0.0) + ROUNDING * (a * c).abs())
     taken = c * x * x - 2 * b * x * y + a * y * y
     short = torch.where(taken > room, torch.sqrt(room / taken.clamp(min=SMALL)), 1.0)
-    mean[XZ], mean[YZ] = x * short, y * short
-    return mean
+    return torch.cat([fields[:, :XZ], (x * short)[:, None], (y * short)[:, None]], dim=1)
 
 
 def unsigned(fields: Tensor) -> Tensor:

@@ -3,7 +3,7 @@
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ class TrainingRules:
         Of Adam, for both networks (2e-4 and 0.5 in pix2pix); the rate falls linearly to zero over
         the second half of the epochs.
     lambda_l1 : float
-        Weight of the L1 term (100 in pix2pix).
+        Weight of the distance to the target, an L1 term in pix2pix (there 100).
     adversarial : float
         Weight of the discriminator's judgement (1 in pix2pix); 0 trains without one.
     seed : int
@@ -57,6 +57,8 @@ class TrainingRules:
         float32, or bfloat16 where networks are evaluated (weights, losses and steps stay float32).
     compiled : bool
         Whether torch compiles the networks.
+    loss : str
+        The distance: l1, or relative (`losses.relative_distance`).
     deterministic : bool
         Whether only operations are used that give the same weights every time, where torch has them.
     """
@@ -74,6 +76,7 @@ class TrainingRules:
     compiled: bool = False
     deterministic: bool = True
     adversarial: float = 1.0
+    loss: str = "l1"
 
 
 def rules_of(settings: Mapping[str, Any], seed: int, threads: int, device: str) -> TrainingRules:
@@ -82,15 +85,18 @@ def rules_of(settings: Mapping[str, Any], seed: int, threads: int, device: str) 
         "epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers", "precision", "compiled",
         "deterministic",
     )  # fmt: skip
+    published = settings["network"] == "pix2pix"
     judged = settings["adversarial"]
     if judged is None:
-        judged = 1.0 if settings["network"] == "pix2pix" else 0.0
+        judged = 1.0 if published else 0.0
+    loss = settings["loss"] or ("l1" if published else "relative")
     return TrainingRules(
         **{name: settings[name] for name in names},
         seed=seed % 2**63,
         threads=threads,
         device=device,
         adversarial=judged,
+        loss=loss,
     )
 
 
@@ -133,7 +139,7 @@ class Trained:
 
 
 def train(
-    stack: Path,
+    stacks: Path | Sequence[Path],
     examples: list[Example],
     splits: list[str],
     scaling: Scaling,
@@ -148,7 +154,7 @@ def train(
     Parameters
     ----------
     splits : list of str
-        Split of each sample of the stack.
+        Split of each sample of the stacks, rows counted through them.
     identity : str
         Hash of everything the training hangs on; a checkpoint of another one is ignored.
 
@@ -163,7 +169,7 @@ def train(
         chosen = [example for example in examples if splits[example.sample] == name]
         if not chosen:
             raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
-        datasets[name] = ExampleSet(stack, chosen, scaling, architecture.pixels)
+        datasets[name] = ExampleSet(stacks, chosen, scaling, architecture.pixels)
     resident = fit_on(device, list(datasets.values()))
     feeders = {name: Feeder(dataset, device, rules.workers, resident) for name, dataset in datasets.items()}
     state = _start(architecture, scaling, rules, device)
@@ -207,7 +213,7 @@ def _start(
     generator, discriminator = Generator(architecture, scaling), Discriminator(architecture)
     # Convolutions of a GPU's tensor cores want the channels together.
     layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
-    if architecture.network == "pix2pix":
+    if architecture.network in ("pix2pix", "modulated"):
         initialise(generator)
         initialise(discriminator)
     for network in (generator, discriminator):
@@ -268,7 +274,7 @@ def _train_epoch(
     ]
     # Read once an epoch: a GPU need not wait for the processor at every step.
     means = torch.stack(losses).mean(0).tolist()
-    return dict(zip(("generator_loss", "l1", "discriminator_loss"), means, strict=True))
+    return dict(zip(("generator_loss", "distance", "discriminator_loss"), means, strict=True))
 
 
 def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:
@@ -277,7 +283,7 @@ def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:
 
 
 def _step(state: _State, inputs: Tensor, target: Tensor, cells: Tensor, rules: TrainingRules) -> Tensor:
-    """One step of the discriminator, if any, then one of the generator; returns their losses and L1, (3,)."""
+    """One step of the discriminator, if any, then of the generator; their losses and the distance, (3,)."""
     prediction = state.generate(inputs, cells)
     judged = torch.zeros((), device=inputs.device)
     if rules.adversarial:
@@ -289,11 +295,11 @@ def _step(state: _State, inputs: Tensor, target: Tensor, cells: Tensor, rules: T
     state.optimisers[0].zero_grad(set_to_none=True)
     state.discriminator.requires_grad_(False)
     opinion = state.judge(inputs, prediction) if rules.adversarial else None
-    loss = generator_loss(opinion, prediction, target, rules.lambda_l1, rules.adversarial)
+    loss = generator_loss(opinion, prediction, target, rules.lambda_l1, rules.adversarial, rules.loss)
     loss.total.backward()  # type: ignore[no-untyped-call]
     state.discriminator.requires_grad_(True)
     state.optimisers[0].step()
-    return torch.stack([loss.total.detach(), loss.l1.detach(), judged.detach()]).double()
+    return torch.stack([loss.total.detach(), loss.distance.detach(), judged.detach()]).double()
 
 
 def validation_error(generator: Generator, scaling: Scaling, batches: Batches) -> float:

@@ -1,4 +1,4 @@
-"""Figures. Each function draws onto a new figure from plain data; `save` writes it."""
+"""The house style, moulds and fields, and figures of data sets and tissues."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -130,23 +130,6 @@ def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
     axes.plot(simulated, predicted, "o", color=SIMULATED, ms=4, alpha=0.75, mec="none")
     axes.set(xlim=(low - pad, high + pad), ylim=(low - pad, high + pad), box_aspect=1)
     axes.locator_params(nbins=4)
-
-
-@STYLED
-def training_figure(history: pd.DataFrame) -> Figure:
-    """Losses and validation error, epoch by epoch; the kept weights are marked."""
-    figure = new_figure(9.0, 3.0)
-    losses, error = figure.subplots(1, 2)
-    losses.plot(history["epoch"], history["l1"] * 100, color=SIMULATED, label="100 x L1")
-    losses.plot(history["epoch"], history["discriminator_loss"], color=PREDICTED, label="discriminator")
-    losses.set(xlabel="epoch", ylabel="loss", yscale="log")
-    losses.legend(frameon=False)
-    error.plot(history["epoch"], history["validation_error"], color=SIMULATED)
-    best = history.iloc[int(history["validation_error"].argmin())]
-    error.plot(best["epoch"], best["validation_error"], "o", color=PREDICTED)
-    error.set_title(f"weights kept: epoch {best['epoch']:.0f}, {best['validation_error']:.3f}")
-    error.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))
-    return figure
 
 
 @STYLED

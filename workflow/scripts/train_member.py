@@ -1,32 +1,38 @@
-"""Train the surrogate on the data set's examples."""
+"""Train one network of a model on the data set's examples."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from raptor.configuration import content_hash
-from raptor.dataset.examples import read_examples
+from raptor.dataset.examples import augment, read_examples
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
 from raptor.device import chosen_device
 from raptor.jobs import logged, progress
-from raptor.surrogate.inference import save
+from raptor.surrogate.files import save
 from raptor.surrogate.networks import architecture_of
 from raptor.surrogate.training import describe, rules_of, train, write_history
 
 with logged(snakemake.log[0]):
     given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
-    table = read_table(stack)
+    extra = [Path(snakemake.input.extra)] if snakemake.input.extra else []
+    table, examples = read_table(stack), read_examples(Path(snakemake.input.examples))
+    splits = list(table.split)
+    for further in extra:
+        examples += [replace(e, sample=len(splits) + e.sample) for e in augment(further, ("train",))]
+        splits += read_table(further).split
     scaling = read_scaling(Path(snakemake.input.normalisation))
     architecture = architecture_of(given, table.pixels)
     device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
     rules = rules_of(given, snakemake.params.seed, snakemake.threads, device)
     # A checkpoint goes on only if configuration and data are those that it was made from.
     files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]
-    identity = content_hash([snakemake.params.identity, *files])
+    identity = content_hash([snakemake.params.identity, snakemake.params.seed, *files])
     with progress("training", rules.epochs) as done:
         trained = train(
-            stack,
-            read_examples(Path(snakemake.input.examples)),
-            table.split,
+            [stack, *extra],
+            examples,
+            splits,
             scaling,
             architecture,
             rules,
@@ -36,7 +42,7 @@ with logged(snakemake.log[0]):
         )
     save(
         Path(snakemake.output.weights).parent,
-        trained.weights,
+        [trained.weights],
         architecture,
         scaling,
         snakemake.params.layers,

@@ -1,0 +1,198 @@
+"""Figures of how good surrogates are."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from raptor.moulds.geometry import Mould
+from raptor.plotting.drawing import (
+    LABELS,
+    PREDICTED,
+    SEQUENTIAL,
+    SIMULATED,
+    STYLED,
+    THIRD,
+    draw_mould,
+    new_figure,
+    show_field,
+)
+from raptor.symmetry import FIELDS
+
+SHAPE_LABELS = {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
+COLOURS = ("#33508a", "#d98c21", "#3c8a5a", "#8a3355", "#6b6b6b", "#5aa9c9", "#b8860b")
+
+
+@STYLED
+def training_figure(history: pd.DataFrame) -> Figure:
+    """Loss and validation error, epoch by epoch, a line a member; the kept weights are marked."""
+    figure = new_figure(9.0, 3.0)
+    losses, errors = figure.subplots(1, 2)
+    kept = []
+    for member, table in history.groupby("member"):
+        label = f"member {member}"
+        losses.plot(table["epoch"], table["distance"], color=COLOURS[int(str(member)) % 7], label=label)
+        if table["discriminator_loss"].any():
+            losses.plot(table["epoch"], table["discriminator_loss"], ":", color=COLOURS[int(str(member)) % 7])
+        errors.plot(table["epoch"], table["validation_error"], color=COLOURS[int(str(member)) % 7])
+        best = table.iloc[int(table["validation_error"].argmin())]
+        errors.plot(best["epoch"], best["validation_error"], "o", color=COLOURS[int(str(member)) % 7])
+        kept.append(float(best["validation_error"]))
+    losses.set(xlabel="epoch", ylabel="distance to the target (dotted: discriminator)", yscale="log")
+    losses.legend(frameon=False, fontsize=7)
+    errors.set_title("weights kept: " + ", ".join(f"{value:.3f}" for value in kept))
+    errors.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))
+    return figure
+
+
+@STYLED
+def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
+    """Share of simulations that bands hold, against what they promise; error against band of both ratios."""
+    figure = new_figure(11.0, 3.6)
+    panels = figure.subplots(1, 3)
+    names = [*FIELDS, *SHAPE_LABELS]
+    labels = {name: text[text.index("$") :] for name, text in LABELS.items()} | SHAPE_LABELS
+    levels = sorted({column.split("_")[0] for column in summary["coverage"]})
+    for level, colour in zip(levels, COLOURS, strict=False):
+        found = [summary["coverage"][f"{level}_{name}"] for name in names]
+        promised = int(level.removeprefix("cover")) / 100
+        panels[0].axhline(promised, color=colour, lw=0.8, ls="--")
+        panels[0].plot(range(len(names)), found, "o", color=colour, label=f"{100 * promised:.0f} % band")
+    panels[0].set_xticks(range(len(names)), [labels[name] for name in names], rotation=60)
+    panels[0].set(ylabel="share of simulations held", ylim=(0, 1.02))
+    panels[0].legend(frameon=False, fontsize=7, loc="lower left")
+    for axes, (name, label) in zip(panels[1:], SHAPE_LABELS.items(), strict=True):
+        error = (metrics[f"{name}_predicted"] - metrics[f"{name}_simulated"]).abs()
+        flagged = metrics["unlike"].astype(bool)
+        for part, colour, text in (
+            (~flagged, SIMULATED, "like the training set"),
+            (flagged, PREDICTED, "flagged"),
+        ):
+            axes.plot(
+                metrics[f"{name}_band95"][part],
+                error[part],
+                "o",
+                ms=3,
+                mec="none",
+                alpha=0.6,
+                color=colour,
+                label=text,
+            )
+        top = float(np.nanmax([error.max(), metrics[f"{name}_band95"].max()]))
+        axes.plot([0, top], [0, top], "--", color=THIRD, lw=0.8)
+        axes.set(xlabel=f"half width of the 95 % band of {label}", ylabel=f"error of {label}")
+        axes.legend(frameon=False, fontsize=7)
+    return figure
+
+
+@STYLED
+def regions_figure(metrics: pd.DataFrame, regions: pd.DataFrame) -> Figure:
+    """Where in the parameters errors are large, and their means by region and on further sets."""
+    figure = new_figure(12.0, 4.0)
+    where, fields, shapes = figure.subplots(1, 3, width_ratios=[1.3, 1, 1])
+    order = metrics.sort_values("vrmse_density")
+    shown = where.scatter(
+        order["delta"], order["kappa_nnn"], c=order["vrmse_density"], s=14, cmap=SEQUENTIAL,
+        vmax=float(order["vrmse_density"].quantile(0.98)), linewidths=0,
+    )  # fmt: skip
+    figure.colorbar(shown, ax=where, label="VRMSE of density")
+    where.set(xlabel=r"$\Delta$", ylabel=r"$\kappa_{NNN}/\kappa_0$")
+    table = regions[regions["samples"] > 0][::-1]
+    rows = np.arange(len(table))
+    fields.barh(rows, table["vrmse_density"], color=SIMULATED)
+    fields.set_yticks(
+        rows, [f"{name} ({n})" for name, n in zip(table["region"], table["samples"], strict=True)], fontsize=6
+    )
+    fields.set(xlabel="VRMSE of density")
+    for offset, (name, colour) in enumerate(zip(SHAPE_LABELS, (SIMULATED, PREDICTED), strict=True)):
+        shapes.barh(
+            rows + 0.2 - 0.4 * offset, table[f"{name}_mae"], 0.38, color=colour, label=SHAPE_LABELS[name]
+        )
+    shapes.set_yticks([])
+    shapes.set(xlabel="mean absolute error")
+    shapes.legend(frameon=False, fontsize=7)
+    return figure
+
+
+@STYLED
+def worst_figure(
+    cases: Sequence[tuple[str, Mould, NDArray[np.floating], NDArray[np.floating]]],
+) -> Figure:
+    """Densities (y, x) of held-out cases, simulated above and predicted below, each with its title."""
+    figure = new_figure(12.0, 8.6)
+    columns = 6
+    blocks = -(-len(cases) // columns)
+    grid = cast(Any, figure.subplots(2 * blocks, columns, squeeze=False))
+    for axes in grid.ravel():
+        axes.set_axis_off()
+    for number, (title, mould, simulated, predicted) in enumerate(cases):
+        row, column = 2 * (number // columns), number % columns
+        limit = float(np.percentile(simulated, 99.8)) or 1.0
+        for offset, density in enumerate((simulated, predicted)):
+            axes = grid[row + offset, column]
+            axes.set_axis_on()
+            show_field(axes, density, "density", limit)
+            draw_mould(axes, mould, fill=False)
+            if column == 0:
+                axes.set_ylabel(("simulation", "prediction")[offset])
+        grid[row, column].set_title(title, fontsize=7)
+    return figure
+
+
+@STYLED
+def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) -> Figure:
+    """Validation error over the minutes of training, and errors against the time of a prediction."""
+    figure = new_figure(12.0, 3.8)
+    training, cost, floors = figure.subplots(1, 3)
+    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(table["model"])}
+    for name, history in histories.items():
+        first = history[history["member"] == 0]
+        training.plot(
+            first["seconds"].cumsum() / 60, first["validation_error"], color=colours[name], label=name
+        )
+    training.set(
+        xlabel="minutes of training, one network", ylabel="validation error (mean VRMSE)", yscale="log"
+    )
+    training.legend(frameon=False, fontsize=7)
+    known = table.dropna(subset=["all_ms"])
+    for _, row in known.iterrows():
+        cost.plot(row["all_ms"], row["vrmse_density"], "o", color=colours[row["model"]])
+        cost.annotate(
+            row["model"],
+            (row["all_ms"], row["vrmse_density"]),
+            xytext=(5, 4),
+            textcoords="offset points",
+            fontsize=7,
+        )
+    cost.set(
+        xscale="log",
+        xlabel="milliseconds of a prediction, all members and images",
+        ylabel="VRMSE of density",
+        ylim=(0, None),
+    )
+    cost.margins(x=0.25)
+    quantities = {
+        "density": "density",
+        "tension": "tension",
+        "sxsx": "$S_xS_x$",
+        "area_ratio": "$A/A_0$",
+        "width_ratio": "$w/w_0$",
+    }
+    width = 0.8 / max(len(table), 1)
+    for number, (_, row) in enumerate(table.iterrows()):
+        heights = [row[f"{name}_in_floors"] for name in quantities]
+        floors.bar(
+            np.arange(len(quantities)) + width * number - 0.4,
+            heights,
+            width,
+            color=colours[row["model"]],
+            label=row["model"],
+        )
+    floors.axhline(1.0, color=THIRD, ls="--", lw=0.8)
+    floors.set_xticks(range(len(quantities)), list(quantities.values()))
+    floors.set(ylabel="error / noise from seed to seed", yscale="log")
+    floors.legend(frameon=False, fontsize=6, ncols=2)
+    return figure

@@ -1,0 +1,59 @@
+"""What a model costs to train and to use."""
+
+import time
+from collections.abc import Mapping
+from statistics import median
+from typing import Any
+
+import pandas as pd
+import shapely
+
+from raptor.moulds.geometry import Circle, Mould
+from raptor.moulds.raster import mould_image
+from raptor.parameters import CellParameters
+from raptor.surrogate.inference import Surrogate
+
+MOULD = Mould(
+    shapely.box(-26.5, -13.25, 26.5, 13.25),
+    tuple(Circle(x, y, 1.5) for x in (-22.5, 22.5) for y in (-9.25, 9.25)),
+    "mirrors",
+)
+PARAMETERS = CellParameters(0.5, 0.4, 0.2)
+CELLS = 9500
+REPEATS = 5
+
+
+def costs_of(
+    surrogate: Surrogate, description: Mapping[str, Any], history: pd.DataFrame
+) -> dict[str, float | str | int]:
+    """Weights, training and milliseconds of prediction, a model.
+
+    One image by one member, all eight images by one member, and those by all members: to the eight fields
+    in physical units, on as many threads as torch has; medians of a few.
+    """
+    one = Surrogate(
+        surrogate.members[:1], surrogate.architecture, surrogate.scaling, surrogate.layers, surrogate.pixels
+    )
+    training = description["training"]
+    return {
+        "network": surrogate.architecture.network,
+        "pixels": surrogate.architecture.pixels,
+        "members": len(surrogate.members),
+        "weights": surrogate.weights,
+        "epochs": int(history["epoch"].max()) + 1,
+        "training_core_minutes": float(history["seconds"].sum() * training["threads"] / 60),
+        "one_image_ms": _milliseconds(one, averaged=False),
+        "eight_images_ms": _milliseconds(one, averaged=True),
+        "all_ms": _milliseconds(surrogate, averaged=True),
+    }
+
+
+def _milliseconds(surrogate: Surrogate, *, averaged: bool) -> float:
+    """Of one prediction of a rectangle with four posts."""
+    image = mould_image(MOULD, surrogate.pixels)
+    times = []
+    for _ in range(REPEATS + 1):  # the first also plans
+        started = time.perf_counter()
+        surrogate.predict(image.depression, image.tethers, [PARAMETERS], CELLS, averaged=averaged)
+        times.append(1000 * (time.perf_counter() - started))
+    return median(times[1:])

@@ -1,0 +1,41 @@
+"""Put the members of a model together, and calibrate them on the validation split."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from raptor.configuration import content_hash
+from raptor.dataset.stack import read_table
+from raptor.files import atomic_path
+from raptor.jobs import logged, progress
+from raptor.moulds import moulds_by_id
+from raptor.surrogate.calibrating import calibrate
+from raptor.surrogate.files import describe, load, save
+
+with logged(snakemake.log[0]):
+    torch.set_num_threads(snakemake.threads)
+    folders = [Path(weights).parent for weights in snakemake.input.weights]
+    trained = [load(folder) for folder in folders]
+    surrogate = replace(trained[0], members=tuple(each.members[0] for each in trained))
+    stack = Path(snakemake.input.stack)
+    moulds = moulds_by_id(Path(snakemake.input.moulds))
+    with progress("calibration", len(read_table(stack).rows("validation"))) as done:
+        found = calibrate(surrogate, stack, moulds, snakemake.params.seed, lambda s: done(f"simulation {s}"))
+    described = [describe(folder) for folder in folders]
+    save(
+        Path(snakemake.output.weights).parent,
+        [member.state_dict() for member in surrogate.members],
+        surrogate.architecture,
+        surrogate.scaling,
+        surrogate.layers,
+        surrogate.pixels,
+        {name: described[0][name] for name in ("training", "torch")},
+        content_hash([content["identity"] for content in described]),
+        found,
+    )
+    tables = [pd.read_csv(history) for history in snakemake.input.histories]
+    with atomic_path(Path(snakemake.output.history)) as path:
+        joined = pd.concat(table.assign(member=number) for number, table in enumerate(tables))
+        joined.to_csv(path, index=False)

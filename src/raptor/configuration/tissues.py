@@ -10,7 +10,7 @@ from raptor.configuration.blocks import Block
 from raptor.configuration.reading import explain, read_yaml
 from raptor.errors import RaptorError
 from raptor.morphology import central_section
-from raptor.moulds.geojson import read_mould
+from raptor.moulds.reading import read_mould
 
 
 class Tissue(Block):

@@ -75,6 +75,6 @@ def _title(numbers: dict[str, Any]) -> dict[str, str]:
     }
     if "like_cells" in numbers:
         said["compared"] = (
-            f"{numbers['like_cells']:,} cells, {100 * numbers['like_difference']:.2g} % of area"
+            f"{numbers['like_cells']:,} cells, {100 * numbers['like_difference']:.2f} % of area apart"
         )
     return said

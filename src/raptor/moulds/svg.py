@@ -35,6 +35,8 @@ SHAPES = {
     "ellipse": svgelements.Ellipse,
 }
 DRAWN: Any = tuple(SHAPES.values())
+LENGTHS = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry"}
+LENGTH = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*(px|pt|pc|mm|cm|in|%)?|auto)\s*")
 PATH_DATA = re.compile(r"\s*([Mm][MmZzLlHhVvCcSsQqTtAaEe\d\s.,+-]*)?")
 
 
@@ -74,12 +76,18 @@ def read_svg(path: Path, scale: float | None = None) -> Mould:
         _require_readable(element, where)
     if scale is None and "data-l0" in root.attrib:
         scale = _unit(root.attrib["data-l0"], where)
-    drawn = svgelements.SVG.parse(BytesIO(content), reify=False)
-    # svgelements gives CSS pixels; lengths here are the file's own, and y goes up.
-    matrix = ~svgelements.Matrix(drawn.viewbox_transform or "") * svgelements.Matrix.scale(1, -1)
-    outline, tethers = _told_apart(list(_shapes(drawn, "", matrix)), where)
-    named = tuple((f"tether '{shape.name}'", shape.tether) for shape in tethers)
-    return Drawing(outline.polygon, named, _page(drawn, root), "user unit").mould(path, scale)
+    try:
+        drawn = svgelements.SVG.parse(BytesIO(content), reify=False)
+        if not isinstance(drawn, svgelements.SVG):
+            raise ValueError('the root has not the namespace xmlns="http://www.w3.org/2000/svg"')
+        # svgelements gives CSS pixels; lengths here are the file's own, and y goes up.
+        matrix = ~svgelements.Matrix(drawn.viewbox_transform or "") * svgelements.Matrix.scale(1, -1)
+        shapes, page = list(_shapes(drawn, "", matrix)), _page(drawn, root)
+    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError) as error:
+        raise RaptorError(f"{where} cannot be read: {error}; save it again as plain SVG") from error
+    outline, tethers = _told_apart(shapes, where)
+    named = tuple((f"tether {shape.name}", shape.tether) for shape in tethers)
+    return Drawing(outline.polygon, named, page, "user unit").mould(path, scale)
 
 
 def _root(content: bytes, where: str) -> ElementTree.Element:
@@ -114,8 +122,9 @@ def _require_readable(element: ElementTree.Element, where: str) -> None:
             corners = attributes.get("points", "").replace(",", " ").split()
             if len([float(value) for value in corners]) % 2:
                 raise ValueError("points must be pairs of numbers")
-        else:
-            SHAPES[tag](dict(attributes))
+        for key in LENGTHS & set(attributes):
+            if not LENGTH.fullmatch(attributes[key]):
+                raise ValueError(f"{key} must be a length")
     except ValueError as error:
         reason = f" ({error})" if str(error) else ""
         raise RaptorError(
@@ -156,8 +165,7 @@ def _shapes(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Sh
         for part in element:
             yield from _shapes(part, role, matrix)
     elif isinstance(element, DRAWN):
-        name = element.id or element.values.get("tag", "shape")
-        pieces = sorted(_pieces(element, str(name), role, matrix), key=lambda p: p.size, reverse=True)
+        pieces = sorted(_pieces(element, role, matrix), key=lambda p: p.size, reverse=True)
         for number, piece in enumerate(pieces):
             # What else a path called outline holds stands within its largest piece.
             yield replace(piece, role="tether") if number and role == "outline" else piece
@@ -173,7 +181,7 @@ def _role(element: Any, inherited: str) -> str:
     return inherited
 
 
-def _pieces(element: Any, name: str, role: str, matrix: svgelements.Matrix) -> Iterator[_Shape]:
+def _pieces(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Shape]:
     """The pieces of a shape that enclose an area."""
     path = abs(svgelements.Path(element) * matrix)
     for piece in path.as_subpaths():
@@ -186,7 +194,15 @@ def _pieces(element: Any, name: str, role: str, matrix: svgelements.Matrix) -> I
         if polygon.is_valid:
             x0, y0, x1, y1 = polygon.bounds
             polygon = polygon.simplify(SMOOTH * max(x1 - x0, y1 - y0))
-        yield _Shape(name, role, polygon, _circle(element, piece))
+        yield _Shape(_name(element, polygon), role, polygon, _circle(element, piece))
+
+
+def _name(element: Any, polygon: shapely.Polygon) -> str:
+    """What messages call a shape: its id, or its kind and where it lies in the drawing."""
+    if element.id:
+        return f"'{element.id}'"
+    x, y = polygon.centroid.x, polygon.centroid.y
+    return f"<{element.values.get('tag', 'shape')}> at ({x:.4g}, {-y:.4g})"
 
 
 def _points(segment: Any) -> list[Any]:
@@ -210,7 +226,7 @@ def _told_apart(shapes: list[_Shape], where: str) -> tuple[_Shape, list[_Shape]]
     """The outline, and the tethers, which all other shapes are."""
     outlines = [shape for shape in shapes if shape.role == "outline"]
     if len(outlines) > 1:
-        names = ", ".join(f"'{shape.name}'" for shape in outlines)
+        names = ", ".join(shape.name for shape in outlines)
         raise RaptorError(
             f"{where}: {len(outlines)} shapes are called outline ({names}); a mould is one connected "
             "outline, so keep one and call what stands in it tether"

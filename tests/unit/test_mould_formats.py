@@ -1,5 +1,8 @@
 """The same mould as GeoJSON, SVG and PNG; and what is said of files that hold none."""
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +95,19 @@ def test_the_drawings_of_the_documentation_are_one_mould():
     assert apart(painted, written) < 0.002
     assert all(isinstance(tether, Circle) for tether in painted.tethers)
     assert summarise(drawn) == summarise(written)
+
+
+def test_the_page_on_moulds_shows_the_files_that_are_there(tmp_path):
+    page = (ROOT / "docs" / "moulds.md").read_text()
+    for language, suffix in (("json", "geojson"), ("xml", "svg")):
+        (block,) = re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
+        assert block == (DOG_BONE / f"dog_bone.{suffix}").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, check=True)
+    painted, kept = (
+        np.asarray(Image.open(folder / "dog_bone.png"), dtype=int) for folder in (tmp_path, DOG_BONE)
+    )
+    assert np.abs(painted - kept).mean() < 0.5  # Pillow's versions may round edges differently
 
 
 def test_up_is_up_in_every_format(tmp_path):

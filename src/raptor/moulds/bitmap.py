@@ -26,6 +26,10 @@ RED = 0.25  # how far, of 1, red exceeds green and blue in a tether
 TOLERANCE = 0.5  # pixels; how far a simplified wall may leave the contour
 BLUR = 1.0  # pixels; how far drawing programs leave a wall from where it was meant
 MOST_PIXELS = 4096  # along a side
+# Pillow tells of damage by exceptions of many kinds.
+DAMAGE = (
+    OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError,
+)  # fmt: skip
 
 
 def read_bitmap(path: Path, scale: float | None = None) -> Mould:
@@ -60,8 +64,7 @@ def _colours(content: bytes, where: str) -> NDArray[np.float64]:
         layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
     except RaptorError:
         raise
-    # Pillow tells of damage by exceptions of many kinds.
-    except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
+    except DAMAGE as error:
         raise RaptorError(f"{where} is not PNG, or is cut short: {error}; save it again as PNG") from error
     opacity = layers[..., 3:]
     return np.asarray(layers[..., :3] * opacity + 1 - opacity)

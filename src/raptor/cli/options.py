@@ -53,14 +53,14 @@ def cell_parameters(
     values = (delta, kappa_nnn, kappa_nnnn)
     names = [field.name for field in fields(CellParameters)]
     given = {name: value for name, value in zip(names, values, strict=True) if value is not None}
-    missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]
-    if not missing:
-        return CellParameters(**given)
-    if tissue is None:
-        raise RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")
-    from raptor.configuration import load_tissue
+    if tissue is not None:
+        from raptor.configuration import load_tissue
 
-    return load_tissue(tissues, tissue).parameters(tissue, given)
+        return load_tissue(tissues, tissue).parameters(tissue, given)
+    missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]
+    if missing:
+        raise RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")
+    return CellParameters(**given)
 
 
 def require_writable(output: Path, kind: str = "a netCDF file") -> None:

@@ -45,6 +45,28 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def read_input(path: Path, what: str, expected: str) -> bytes:
+    """Content of a file that a user gives; messages call it `what` and say what is `expected` in it.
+
+    Raises
+    ------
+    RaptorError
+        Where it does not exist, is no file, cannot be read or is empty.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise RaptorError(f"{what} {path} is a folder; give a file")
+    if not path.is_file():
+        raise RaptorError(f"{what} {path} does not exist; check the path")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RaptorError(f"{what} {path} cannot be read: {error.strerror}") from error
+    if not content.strip():
+        raise RaptorError(f"{what} {path} is empty; {expected} is expected")
+    return content
+
+
 def _is_full(folder: Path) -> bool:
     """Whether the disk is out of room; libraries such as HDF5 do not say so themselves."""
     try:

@@ -21,7 +21,7 @@ from raptor.condor.lattice import cast_sites
 from raptor.errors import RaptorError
 from raptor.fields import rasterise
 from raptor.files import atomic_path
-from raptor.morphology import area_ratio, density_threshold, width_ratio
+from raptor.morphology import area_ratio, density_threshold, shape_ratios, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import (
@@ -172,9 +172,7 @@ def measure_simulation(
 ) -> dict[str, float]:
     """Area ratio, width ratio and residual sum of squares of a simulated tissue."""
     density = rasterise(simulation.positions, simulation.orientation, simulation.tension, pixels)[0]
-    threshold = density_threshold(model.layers, pixels)
-    area = area_ratio(density, mould_image(mould, pixels), threshold)
-    width = width_ratio(density, mould, threshold)
+    area, width = shape_ratios(density, mould, model.layers)
     rss = float((target.residuals(np.array([area, width])) ** 2).sum())
     return {"area_ratio": area, "width_ratio": width, "rss": rss}
 

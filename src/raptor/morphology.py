@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from raptor.moulds.geometry import IMAGE_SIZE, Mould
-from raptor.moulds.raster import MouldImage, pixel_size
+from raptor.moulds.raster import MouldImage, mould_image, pixel_size
 
 SAMPLES_PER_PIXEL = 4  # along a section
 
@@ -19,6 +19,20 @@ def density_threshold(layers: int, pixels: int) -> float:
 def area_ratio(density: NDArray[np.floating], image: MouldImage, threshold: float) -> float:
     """A/A0: pixels (y, x) of tissue anywhere in the image, over pixels of the depression."""
     return float(np.count_nonzero(density > threshold) / np.count_nonzero(image.depression))
+
+
+def shape_ratios(density: NDArray[np.floating], mould: Mould, layers: int) -> tuple[float, float]:
+    """A/A0 and w/w0 of a tissue of so many layers from its density (y, x) in its mould.
+
+    Raises
+    ------
+    RaptorError
+        Where the depression covers no pixel.
+    """
+    pixels = density.shape[-1]
+    threshold = density_threshold(layers, pixels)
+    area = area_ratio(density, mould_image(mould, pixels), threshold)
+    return area, width_ratio(density, mould, threshold)
 
 
 def central_section(mould: Mould) -> shapely.LineString:

@@ -9,12 +9,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from raptor.cli import COMMANDS
+from raptor.condor.lattice import cast_sites
 from raptor.dataset.checks import check
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
+from raptor.moulds import read_mould
 
 ROOT = Path(__file__).parents[2]
 MOULD = str(ROOT / "config" / "moulds" / "tenocyte.geojson")
+TISSUES = str(ROOT / "config" / "tissues.yaml")
+DOG_BONE = ROOT / "tests" / "data" / "moulds"
 
 
 def raptor(*arguments):
@@ -36,9 +41,72 @@ def test_simulate_writes_a_sound_shard(tmp_path):
         assert int(shard["row_size"][0]) == shard.sizes["cell"] > 500
 
 
+def test_simulate_takes_a_tissue_and_gives_a_picture_and_numbers(tmp_path):
+    output, picture = tmp_path / "tissue.nc", tmp_path / "tissue.png"
+    done = raptor(
+        "simulate", DOG_BONE / "dog_bone.svg", "--tissue", "corneal", "--delta", 0.3, "--scale", 0.5,
+        "--layers", 1, "--accuracy", "draft", "--output", output, "--picture", picture, "--json",
+        "--tissues", ROOT / "config" / "tissues.yaml",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    numbers = json.loads(done.stdout)
+    assert (numbers["delta"], numbers["kappa_nnn"]) == (0.3, 0.6465)  # a flag goes before the tissue
+    assert check(output) == []
+    with xr.open_dataset(output) as shard:
+        assert numbers["cells"] == shard.sizes["cell"]
+        assert numbers["converged"] is bool(shard["converged"][0])
+    assert 0.3 < numbers["width_ratio"] < 1
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_draw_shows_converts_and_compares(tmp_path):
+    picture, converted = tmp_path / "a.svg", tmp_path / "a.geojson"
+    files = ("--output", picture, "--geojson", converted)
+    done = raptor("draw", DOG_BONE / "dog_bone.svg", *files)
+    assert done.returncode == 0, done.stderr
+    assert "size 52 x 24 l0" in done.stdout
+    assert "<svg" in picture.read_text()
+    done = raptor("draw", DOG_BONE / "dog_bone.geojson", "--like", converted, "--json", "--layers", 3)
+    numbers = json.loads(done.stdout)
+    assert (numbers["width"], numbers["height"], numbers["tethers"]) == (52, 24, 4)
+    assert numbers["symmetry"] == "mirrors"
+    assert numbers["cells"] == numbers["like_cells"] == len(cast_sites(read_mould(converted), 3))
+    assert numbers["like_difference"] < 1e-9
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("--output", "a.jpg"), "a.jpg is no picture's name; give one that ends in .png or .svg"),
+        (("--output", "nowhere/a.png"), "folder nowhere does not exist"),
+        (("--geojson", "a.svg"), "a.svg is no GeoJSON's name"),
+        (("--layers", 0), "layers is 0; 1 to 64 are allowed"),
+        (("--scale", 0), "scale is 0.0; give a positive number"),
+        (("--scale", 0.1), "tether <circle> at (-21, -7) is too thin"),
+        (("--like", "none.png"), "none.png does not exist"),
+    ],
+)
+def test_bad_input_to_draw(arguments, message):
+    done = raptor("draw", DOG_BONE / "dog_bone.svg", *arguments)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: ")
+    assert message in done.stderr
+
+
+def test_every_command_teaches_by_an_example():
+    for command in COMMANDS:
+        assert f"\n    Example:\n      raptor {command.__name__} " in command.__doc__
+    done = raptor("simulate", "--help")
+    assert "raptor simulate mould.svg --tissue glial_1 \\" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((MOULD,), "give --delta, --kappa-nnn, --kappa-nnnn, or --tissue NAME"),
+        ((MOULD, "--tissue", "glia_1", "--tissues", TISSUES), "did you mean 'glial_1'?"),
+        ((MOULD, "--tissue", "glial_1", "--tissues", "none.yaml"), "none.yaml cannot be read"),
+        ((MOULD, *options(), "--picture", "a.gif"), "a.gif is no picture's name"),
         (("none.geojson", *options()), "none.geojson does not exist"),
         ((MOULD, *options(delta=1.0)), "delta is 1.0; the model allows 0 <= delta < 1"),
         ((MOULD, *options(nnn=-1)), "kappa_nnn is -1.0; the model allows 0 <= kappa_nnn <= 1"),
@@ -142,6 +210,8 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
 def test_check_takes_moulds_and_tables(made, tmp_path):
     for path in (MOULD, made / "design" / "design.csv", made / "dataset" / "normalisation.json"):
         assert check(Path(path)) == []
+    for name in ("dog_bone.svg", "dog_bone.png"):
+        assert check(DOG_BONE / name) == []
     bad = tmp_path / "bad.geojson"
     bad.write_text('{"type": "FeatureCollection", "features": [1]}')
     done = raptor("check", bad)

@@ -19,14 +19,6 @@ rule sample_design:
         mem_mb=500,
     params:
         configuration=CONFIG.fingerprint("design"),
-        dump=CONFIG.model_dump(
-            mode="json",
-            include={
-                "seed": True,
-                "design": True,
-                "moulds": True,
-                "model": {"layers"},
-            },
-        ),
+        dump=CONFIG.dump_drawn(),
     script:
         "../scripts/sample_design.py"

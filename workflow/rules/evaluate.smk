@@ -1,23 +1,19 @@
 """How good every model is on held-out simulations."""
 
 
-def evaluated(wildcards):
-    """The stack and moulds of a set: the data set's own, or a further one."""
-    if wildcards.set == "test":
-        return {
-            "stack": rules.build_stack.output.stack,
-            "moulds": rules.sample_design.output.moulds,
-        }
-    return {
-        "stack": expand(rules.stack_further.output.stack, set=wildcards.set)[0],
-        "moulds": expand(rules.design_further.output.moulds, set=wildcards.set)[0],
-    }
-
-
 rule evaluate_model:
     """Errors of fields and bulk statistics, of a model on a set."""
     input:
-        unpack(evaluated),
+        stack=lambda wildcards: (
+            rules.build_stack.output.stack
+            if wildcards.set == "test"
+            else expand(rules.stack_further.output.stack, set=wildcards.set)
+        ),
+        moulds=lambda wildcards: (
+            rules.sample_design.output.moulds
+            if wildcards.set == "test"
+            else expand(rules.design_further.output.moulds, set=wildcards.set)
+        ),
         weights=rules.assemble_model.output.weights,
         model=rules.assemble_model.output.model,
     output:

@@ -1,15 +1,4 @@
-"""Simulations beside the design: the noise floor, and what is unlike everything that was drawn."""
-
-DUMP = CONFIG.model_dump(
-    mode="json",
-    include={
-        "seed": True,
-        "design": True,
-        "moulds": True,
-        "further": True,
-        "model": {"layers"},
-    },
-)  # what designs are drawn from
+"""Simulations beside the design: the noise floor, what is unlike all drawn, and more to learn from."""
 
 
 rule design_further:
@@ -30,7 +19,7 @@ rule design_further:
     params:
         size=lambda wildcards: SETS[wildcards.set],
         configuration=lambda wildcards: CONFIG.further_fingerprint(wildcards.set),
-        dump=DUMP,
+        dump=CONFIG.dump_drawn("further"),
     script:
         "../scripts/design_further.py"
 
@@ -53,7 +42,7 @@ rule enrich:
         mem_mb=2000,
     params:
         size=SETS.get("enriched"),
-        dump=DUMP,
+        dump=CONFIG.dump_drawn("further"),
     script:
         "../scripts/enrich.py"
 
@@ -97,7 +86,9 @@ use rule build_stack as stack_further with:
         f"{RESULTS}/benchmarks/stack_further/{{set}}.tsv"
     params:
         pixels=CONFIG.fields.pixels,
-        simulation_configuration=lambda wildcards: CONFIG.further_fingerprint(wildcards.set),
+        simulation_configuration=lambda wildcards: CONFIG.further_fingerprint(
+            wildcards.set
+        ),
         configuration=lambda wildcards: CONFIG.further_fingerprint(wildcards.set),
 
 

@@ -1,11 +1,6 @@
 """Training of the surrogate, and of what it is compared with."""
 
 
-def members(wildcards):
-    """Names of the members of a model."""
-    return range(MODELS[wildcards.model].members)
-
-
 rule train_member:
     """Train one network of a model; goes on from its checkpoint after an interruption."""
     input:
@@ -48,17 +43,17 @@ rule assemble_model:
         moulds=rules.sample_design.output.moulds,
         weights=lambda wildcards: expand(
             rules.train_member.output.weights,
-            member=members(wildcards),
+            member=range(MODELS[wildcards.model].members),
             allow_missing=True,
         ),
         models=lambda wildcards: expand(
             rules.train_member.output.model,
-            member=members(wildcards),
+            member=range(MODELS[wildcards.model].members),
             allow_missing=True,
         ),
         histories=lambda wildcards: expand(
             rules.train_member.output.history,
-            member=members(wildcards),
+            member=range(MODELS[wildcards.model].members),
             allow_missing=True,
         ),
     output:

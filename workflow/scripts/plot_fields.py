@@ -19,6 +19,6 @@ with logged(snakemake.log[0]):
     moulds = moulds_by_id(Path(snakemake.input.moulds))
     surrogate = load(Path(snakemake.input.weights).parent)
     predicted = surrogate.predict(sample.depression, sample.tethers, [sample.parameters], sample.n_cells)[0]
-    figure = fields_figure(sample.fields, predicted, moulds[sample.mould])
-    save(figure, Path(snakemake.output.png).with_suffix(""))
-    save_fields(Path(snakemake.output.data), {"simulation": sample.fields, "prediction": predicted})
+    stacks = {"simulation": sample.fields, "prediction": predicted}
+    save(fields_figure(stacks, moulds[sample.mould]), Path(snakemake.output.png).with_suffix(""))
+    save_fields(Path(snakemake.output.data), stacks)

@@ -1,7 +1,16 @@
 """The typed configuration: blocks, the whole, its reading, measured tissues."""
 
 from raptor.configuration.reading import load, parse, require_castable
-from raptor.configuration.tissues import Tissue, load_tissues
+from raptor.configuration.tissues import Tissue, load_tissue, load_tissues
 from raptor.configuration.whole import Configuration, content_hash
 
-__all__ = ["Configuration", "Tissue", "content_hash", "load", "load_tissues", "parse", "require_castable"]
+__all__ = [
+    "Configuration",
+    "Tissue",
+    "content_hash",
+    "load",
+    "load_tissue",
+    "load_tissues",
+    "parse",
+    "require_castable",
+]

@@ -12,7 +12,7 @@ from raptor.condor.lattice import cast_sites
 from raptor.configuration.tradeoff import TradeoffCase
 from raptor.configuration.whole import Configuration
 from raptor.errors import RaptorError
-from raptor.moulds.geojson import read_mould
+from raptor.moulds.reading import read_mould
 
 
 def parse(content: Any, where: str) -> Configuration:

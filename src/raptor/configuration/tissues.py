@@ -1,7 +1,11 @@
 """Measured tissues, to be fitted."""
 
+from collections.abc import Mapping
+from dataclasses import fields
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -10,7 +14,8 @@ from raptor.configuration.blocks import Block
 from raptor.configuration.reading import explain, read_yaml
 from raptor.errors import RaptorError
 from raptor.morphology import central_section
-from raptor.moulds.geojson import read_mould
+from raptor.moulds.reading import read_mould
+from raptor.parameters import CellParameters
 
 
 class Tissue(Block):
@@ -21,6 +26,21 @@ class Tissue(Block):
     area_ratio: float | None = Field(None, gt=0, le=1.5, description="A/A0")
     width_ratio: float | None = Field(None, gt=0, le=1.5, description="w/w0")
     paper: dict[str, float] = Field(default_factory=dict, description="the paper's fit")
+
+    def parameters(self, name: str, given: Mapping[str, float] = MappingProxyType({})) -> CellParameters:
+        """The paper's fitted parameters of the tissue called `name`, those `given` instead of its own.
+
+        Raises
+        ------
+        RaptorError
+            Where the paper gives no fit of a parameter that is not given, or a value is out of bounds.
+        """
+        values = self.paper | dict(given)
+        names = [field.name for field in fields(CellParameters)]
+        missing = [field for field in names if field not in values]
+        if missing:
+            raise RaptorError(f"tissue {name} has no fitted {', '.join(missing)}; give a value yourself")
+        return CellParameters(**{field: values[field] for field in names})
 
     @model_validator(mode="after")
     def _measured(self) -> "Tissue":
@@ -42,16 +62,32 @@ def load_tissues(
     content = read_yaml(Path(path))
     chosen = {}
     for name in names if names is not None else content:
-        if name not in content:
-            near = get_close_matches(name, content, 1)
-            hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(content)}"
-            raise RaptorError(f"{path} has no tissue '{name}'{hint}")
-        try:
-            chosen[name] = Tissue.model_validate(content[name])
-        except ValidationError as error:
-            raise RaptorError("; ".join(explain(error, f"{path}, {name}", Tissue))) from None
+        chosen[name] = _tissue(content, name, path)
         _require_measurable(chosen[name], name, mould_scale)
     return chosen
+
+
+def load_tissue(path: Path, name: str) -> Tissue:
+    """Read one tissue; its mould is not.
+
+    Raises
+    ------
+    RaptorError
+        Where the file or the tissue in it cannot be used.
+    """
+    return _tissue(read_yaml(Path(path)), name, path)
+
+
+def _tissue(content: dict[str, Any], name: str, path: Path) -> Tissue:
+    """A tissue of a file's content."""
+    if name not in content:
+        near = get_close_matches(name, content, 1)
+        hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(content)}"
+        raise RaptorError(f"{path} has no tissue '{name}'{hint}")
+    try:
+        return Tissue.model_validate(content[name])
+    except ValidationError as error:
+        raise RaptorError("; ".join(explain(error, f"{path}, {name}", Tissue))) from None
 
 
 def _require_measurable(tissue: Tissue, name: str, scale: float) -> None:

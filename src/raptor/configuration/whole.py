@@ -152,6 +152,11 @@ class Configuration(Block):
             m.cells, self.model.layers, m.tethers, m.tether_radius, m.arm_width, m.margin, symmetry
         )
 
+    def dump_drawn(self, *further: str) -> dict[str, Any]:
+        """What designs are drawn from, and further blocks by name, for the rules that draw them."""
+        blocks: Any = {"seed": True, "design": True, "moulds": True, "model": {"layers"}}
+        return self.model_dump(mode="json", include=blocks | dict.fromkeys(further, True))
+
     def design_rules(self) -> DesignRules:
         """What the design is drawn from."""
         d = self.design

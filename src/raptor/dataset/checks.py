@@ -25,6 +25,7 @@ from raptor.fields import DEEP
 from raptor.moulds.geojson import moulds_by_id, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image, pixel_size
+from raptor.moulds.reading import read_mould
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32
@@ -34,6 +35,7 @@ WALL_YIELD = 0.1  # l0; how far a soft wall gives way
 def check(path: Path, part: float = 1.0) -> list[str]:
     """Check a results folder, or any file of one: shard, stack, prediction, table, moulds.
 
+    Moulds may be GeoJSON, SVG or PNG.
     Energy, tension and fields of a folder are computed again for a random `part` of its simulations.
 
     Returns
@@ -51,6 +53,8 @@ def check(path: Path, part: float = 1.0) -> list[str]:
         return list(_check_folder(path, part))
     if path.suffix == ".geojson":
         return _fault_of(read_moulds, path)
+    if path.suffix.lower() in (".svg", ".png"):
+        return _fault_of(read_mould, path)
     if path.suffix == ".csv":
         return _fault_of(read_examples if path.name == "examples.csv" else read_design, path)
     if path.suffix == ".json":

@@ -9,7 +9,7 @@ from typing import Any
 import shapely
 
 from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.files import atomic_path, read_input
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
 
@@ -22,14 +22,7 @@ def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
         Where the file is missing, empty, not GeoJSON, or a mould in it cannot be cast.
     """
     path = Path(path)
-    if not path.is_file():
-        raise RaptorError(f"mould file {path} does not exist; check the path")
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise RaptorError(f"mould file {path} cannot be read: {error.strerror}") from error
-    if not text.strip():
-        raise RaptorError(f"mould file {path} is empty; a GeoJSON polygon is expected")
+    text = read_input(path, "mould file", "a GeoJSON polygon").decode("utf-8", errors="replace")
     try:
         document = json.loads(text)
     except json.JSONDecodeError as error:
@@ -59,8 +52,8 @@ def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mo
     return {mould.name: mould for mould in read_moulds(path, only)}
 
 
-def read_mould(path: Path) -> Mould:
-    """Read a file that holds one mould.
+def read_geojson(path: Path) -> Mould:
+    """Read a GeoJSON file that holds one mould.
 
     Raises
     ------

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.affinity import translate
 from shapely.validation import explain_validity
 
 from raptor.errors import RaptorError
@@ -66,6 +67,10 @@ class Circle:
         """The post scaled about the origin."""
         return Circle(self.x * factor, self.y * factor, self.radius * factor)
 
+    def shifted(self, x: float, y: float) -> "Circle":
+        """The post moved by (x, y), l0."""
+        return replace(self, x=self.x + x, y=self.y + y)
+
     def as_json(self) -> dict[str, Any]:
         """As it stands in a mould file."""
         return {"x": self.x, "y": self.y, "radius": self.radius}
@@ -103,6 +108,10 @@ class PolygonTether:
     def scaled(self, factor: float) -> "PolygonTether":
         """The tether scaled about the origin."""
         return PolygonTether(_transform(self.polygon, np.eye(2) * factor))
+
+    def shifted(self, x: float, y: float) -> "PolygonTether":
+        """The tether moved by (x, y), l0."""
+        return PolygonTether(translate(self.polygon, x, y))
 
     def as_json(self) -> dict[str, Any]:
         """As it stands in a mould file."""
@@ -151,10 +160,7 @@ class Mould:
                 f"the origin, outside the image; keep it within {half} l0 in x and y"
             )
         for number, tether in enumerate(self.tethers, start=1):
-            what = f"{self.name}: tether {number}"
-            tether.validate(what)
-            if not tether.stands_in(self.outline):
-                raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
+            require_standing(tether, self.outline, f"{self.name}: tether {number}")
         # Most moulds have room left whatever their tethers overlap; the union is dear.
         room = self.outline.area - sum(tether.area for tether in self.tethers)
         if room < 1e-6 and self.depression.area < 1e-6:
@@ -199,6 +205,13 @@ class Mould:
                 "area": self.depression.area,
             },
         }
+
+
+def require_standing(tether: Tether, outline: shapely.Polygon, what: str) -> None:
+    """Raise a RaptorError, which calls the tether `what`, unless it holds cells back in a valid outline."""
+    tether.validate(what)
+    if not tether.stands_in(outline):
+        raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
 
 
 def signed_depth(polygon: shapely.Polygon, points: NDArray[np.float64]) -> NDArray[np.float64]:

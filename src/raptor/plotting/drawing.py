@@ -15,6 +15,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from raptor.condor import Simulation
+from raptor.errors import RaptorError
 from raptor.files import atomic_path
 from raptor.metrics import BULK
 from raptor.moulds.geometry import IMAGE_SIZE, Mould
@@ -37,6 +38,8 @@ STYLE: dict[Any, Any] = {
 }  # fmt: skip
 STYLED = mpl.rc_context(STYLE)
 """Decorates a function that draws, so that it draws in the house style."""
+METADATA: dict[str, dict[str, None]] = {".png": {"Software": None}, ".svg": {"Date": None}}
+"""Suffixes of pictures, and what is left out of them so that the same data give the same bytes."""
 HALF = IMAGE_SIZE / 2
 
 
@@ -48,10 +51,27 @@ def new_figure(width: float, height: float) -> Figure:
 
 def save(figure: Figure, stem: Path) -> None:
     """Write a figure as PNG and SVG, the same bytes for the same data."""
-    with mpl.rc_context(STYLE):
-        for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
-            with atomic_path(stem.with_name(stem.name + suffix)) as temporary:
-                figure.savefig(temporary, metadata=metadata)
+    for suffix in METADATA:
+        save_picture(figure, stem.with_name(stem.name + suffix))
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG or SVG, by its suffix, the same bytes for the same data.
+
+    Raises
+    ------
+    RaptorError
+        Where the suffix is another, or the place cannot be written.
+    """
+    require_picture(path)
+    with mpl.rc_context(STYLE), atomic_path(path) as temporary:
+        figure.savefig(temporary, metadata=METADATA[path.suffix.lower()])
+
+
+def require_picture(path: Path) -> None:
+    """Raise a RaptorError unless a path's suffix is one of a picture's."""
+    if path.suffix.lower() not in METADATA:
+        raise RaptorError(f"{path} is no picture's name; give one that ends in {' or '.join(METADATA)}")
 
 
 def draw_mould(axes: Axes, mould: Mould, *, fill: bool = True) -> None:
@@ -89,23 +109,58 @@ def show_field(axes: Axes, image: NDArray[np.floating], field: str, limit: float
 
 
 @STYLED
-def fields_figure(simulated: NDArray[np.floating], predicted: NDArray[np.floating], mould: Mould) -> Figure:
-    """The paper's first figure: a mould, and its eight fields (8, y, x) simulated and predicted."""
-    figure = new_figure(11.0, 6.4)
+def fields_figure(stacks: Mapping[str, NDArray[np.floating]], mould: Mould) -> Figure:
+    """The paper's first figure: a mould, and its eight fields, one or several stacks (8, y, x) by source.
+
+    Colours of a field are those of the first stack.
+    """
+    count = len(stacks)
+    figure = new_figure(11.0, 0.4 + 3.0 * count)
     left, right = cast(Any, figure.subfigures(1, 2, width_ratios=[1, 5.2]))
     axes = left.add_subplot()
     draw_mould(axes, mould)
     axes.set_title(f"mould {mould.name}\n(image {IMAGE_SIZE:g} $l_0$ wide)")
-    grid = right.subplots(4, 4)
+    grid = right.subplots(2 * count, 4)
     for number, field in enumerate(FIELDS):
-        row, column = 2 * (number // 4), number % 4
-        limit = float(np.percentile(np.abs(simulated[number]), 99.8)) or 1.0
-        for offset, (source, stack) in enumerate((("simulation", simulated), ("prediction", predicted))):
+        row, column = count * (number // 4), number % 4
+        limit = float(np.percentile(np.abs(next(iter(stacks.values()))[number]), 99.8)) or 1.0
+        for offset, (source, stack) in enumerate(stacks.items()):
             shown = show_field(grid[row + offset, column], stack[number], field, limit)
             if column == 0:
                 grid[row + offset, column].set_ylabel(source)
         grid[row, column].set_title(LABELS[field])
-        right.colorbar(shown, ax=grid[row : row + 2, column], shrink=0.8, format="%.2g")
+        right.colorbar(shown, ax=grid[row : row + count, column], shrink=0.8, format="%.2g")
+    return figure
+
+
+@STYLED
+def mould_figure(
+    mould: Mould, sites: NDArray[np.float64], numbers: Mapping[str, Any], like: Mould | None = None
+) -> Figure:
+    """A mould as the model sees it.
+
+    Parameters
+    ----------
+    sites : ndarray (cells, 2)
+        Where cells of one layer stand, l0.
+    numbers : mapping
+        What the title says, by name.
+    like : Mould, optional
+        Another mould, whose outline is drawn beside this one's, dashed.
+    """
+    figure = new_figure(5.2, 5.8)
+    axes = figure.add_subplot()
+    draw_mould(axes, mould)
+    axes.plot(sites[:, 0], sites[:, 1], ".", ms=1.5, color=SIMULATED, rasterized=True)
+    if like is not None:
+        for shape in (like.outline, *(tether.polygon for tether in like.tethers)):
+            axes.plot(*np.asarray(shape.exterior.coords).T, "--", color=PREDICTED, lw=1)
+    axes.plot([-HALF + 2, -HALF + 12], [-HALF + 2] * 2, "-", color="black", lw=2, solid_capstyle="butt")
+    axes.text(-HALF + 7, -HALF + 2.8, "10 $l_0$", ha="center", va="bottom")
+    axes.spines[:].set_visible(True)  # the frame is part of what the model sees
+    width = max(len(name) for name in numbers)
+    table = [f"{name:>{width}}  {value}" for name, value in numbers.items()]
+    axes.set_title("\n".join(table), loc="left", family="monospace", fontsize=8)
     return figure
 
 

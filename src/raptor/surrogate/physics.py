@@ -107,7 +107,8 @@ def _positive(tensor: Tensor, trace: Tensor) -> Tensor:
     values, vectors = torch.linalg.eigh((tensor / size).double())
     values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
     values = values * (trace / values.sum(1))[:, None]
-    return ((vectors * values[:, None, :]) @ vectors.transpose(1, 2)).to(tensor.dtype)
+    mended: Tensor = (vectors * values[:, None, :]) @ vectors.transpose(1, 2)
+    return mended.to(tensor.dtype)
 
 
 def average(fields: Tensor) -> Tensor:

@@ -1,0 +1,57 @@
+"""The command line: `raptor COMMAND`, one function a command, each with an example in its help."""
+
+import inspect
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import typer
+
+from raptor.cli.data import check, progress, reference, same, trace, well
+from raptor.cli.draw import draw
+from raptor.cli.predict import predict
+from raptor.cli.simulate import simulate
+from raptor.errors import RaptorError
+
+HELP = """Rapid prediction of tissue organisation: CONDOR simulations and their surrogate.
+
+Your own mould, drawn as GeoJSON, SVG or PNG (docs/moulds.md), in three steps:
+
+Example:
+  raptor draw mould.svg --output mould.png
+  raptor simulate mould.svg --tissue glial_1 --output tissue.nc
+  raptor predict mould.svg --tissue glial_1 --output prediction.nc
+"""
+COMMANDS: tuple[Callable[..., Any], ...] = (
+    draw, simulate, predict, check, trace, same, progress, well, reference,
+)  # fmt: skip
+
+
+def _help(text: str) -> str:
+    """Help from a docstring: paragraphs flow; an example keeps its lines, as a shell would take them."""
+    paragraphs = inspect.cleandoc(text).split("\n\n")
+    for number, paragraph in enumerate(paragraphs):
+        if paragraph.startswith("Example:"):
+            paragraphs[number] = "\b\n" + paragraph.replace("\n      ", " \\\n      ")  # \b: typer's sign
+        else:
+            paragraphs[number] = " ".join(paragraph.split())
+    return "\n\n".join(paragraphs)
+
+
+app = typer.Typer(
+    help=_help(HELP),
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in COMMANDS:
+    app.command(help=_help(command.__doc__ or ""))(command)
+
+
+def main() -> None:
+    """Run the command line; bad input ends in one sentence and exit status 1."""
+    try:
+        app()
+    except RaptorError as error:
+        sys.stderr.write(f"error: {error}\n")
+        raise SystemExit(1) from None

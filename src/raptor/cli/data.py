@@ -1,0 +1,118 @@
+"""What a data set holds and where it comes from: check, trace, same, progress, well, reference."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import yaml
+
+from raptor.errors import RaptorError
+
+
+def progress(
+    folder: Annotated[Path, typer.Argument(help="results folder, for instance results/paper")],
+) -> None:
+    """Tell how many of a data set's simulations are done, at what rate, and the time left.
+
+    Example:
+      raptor progress results/paper
+    """
+    from raptor.dataset.progress import progress_of
+
+    typer.echo(f"{folder}: {progress_of(folder)}")
+
+
+def well(
+    stack: Annotated[Path, typer.Argument(help="dataset/fields.nc of a results folder")],
+    folder: Annotated[Path, typer.Argument(help="where data/train, data/valid and data/test are put")],
+) -> None:
+    """Write a field stack in the HDF5 layout of The Well, one file a split.
+
+    Example:
+      raptor well results/paper/dataset/fields.nc results/paper/well
+    """
+    from raptor.dataset.well import write_well
+
+    for path in write_well(stack, folder):
+        typer.echo(path)
+
+
+def check(
+    path: Annotated[Path, typer.Argument(help="results folder, shard, field stack or mould")],
+    part: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="of a folder's simulations, chosen at random, to compute again"),
+    ] = 1.0,
+) -> None:
+    """Hold a data set, a shard, a field stack or a mould against its rules; name every fault.
+
+    Example:
+      raptor check results/laptop
+      raptor check mould.svg
+    """
+    from raptor.dataset.checks import check as find_faults
+
+    if not path.exists():
+        raise RaptorError(f"{path} does not exist; check the path")
+    faults = find_faults(path, part)
+    for fault in faults:
+        typer.echo(fault)
+    typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")
+    raise typer.Exit(1 if faults else 0)
+
+
+def trace(
+    folder: Annotated[Path, typer.Argument(help="results folder")],
+    simulation: Annotated[int | None, typer.Option(help="simulation id")] = None,
+    example: Annotated[int | None, typer.Option(help="row of dataset/examples.csv, from 0")] = None,
+) -> None:
+    """Tell where a sample comes from: mould, parameters, seed, solver, package and model version.
+
+    Example:
+      raptor trace results/laptop --simulation 7
+    """
+    from raptor.dataset.provenance import trace_example, trace_simulation
+
+    if (simulation is None) == (example is None):
+        raise RaptorError("give one of --simulation and --example")
+    if simulation is not None:
+        found = trace_simulation(folder, simulation)
+    else:
+        assert example is not None
+        found = trace_example(folder, example)
+    typer.echo(yaml.safe_dump(found, sort_keys=False).rstrip())
+
+
+def same(
+    first: Annotated[Path, typer.Argument(help="results folder")],
+    second: Annotated[Path, typer.Argument(help="another one")],
+) -> None:
+    """Say whether two results folders hold the same data: bit-equal but for times.
+
+    Example:
+      raptor same results/laptop results/again
+    """
+    from raptor.dataset.same import differences
+
+    for folder in (first, second):
+        if not (folder / "dataset" / "fields.nc").is_file():
+            raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder")
+    found = differences(first, second)
+    for difference in found:
+        typer.echo(difference)
+    typer.echo("not the same data" if found else "the same data")
+    raise typer.Exit(1 if found else 0)
+
+
+def reference(
+    root: Annotated[Path, typer.Argument(help="the project's folder")] = Path(),
+) -> None:
+    """Write what is generated from the configuration model: JSON schema and key table.
+
+    Example:
+      raptor reference .
+    """
+    from raptor.reference import write_reference
+
+    for path in write_reference(root):
+        typer.echo(path)

@@ -1,0 +1,104 @@
+"""What several commands share: arguments, parameters by flag or by tissue, results for people or scripts."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from raptor.errors import RaptorError
+from raptor.parameters import CellParameters
+
+Mould = Annotated[Path, typer.Argument(help="mould: GeoJSON, SVG or PNG (docs/moulds.md)")]
+Scale = Annotated[
+    float | None,
+    typer.Option(
+        help="l0 a unit of the mould's file (GeoJSON coordinate, SVG user unit, pixel); without it a GeoJSON "
+        "is in l0, and the page of a drawing is the frame of 62.5 l0"
+    ),
+]
+Delta = Annotated[float | None, typer.Option(help="cell-matrix interaction, 0 to 1")]
+KappaNNN = Annotated[float | None, typer.Option("--kappa-nnn", help="second spring constant, in kappa0")]
+KappaNNNN = Annotated[float | None, typer.Option("--kappa-nnnn", help="third spring constant, in kappa0")]
+Tissue = Annotated[
+    str | None,
+    typer.Option(help="tissue whose fitted parameters to take, such as glial_1; a flag goes before them"),
+]
+Tissues = Annotated[Path, typer.Option(help="where tissues are described")]
+TISSUES = Path("config/tissues.yaml")
+Output = Annotated[Path, typer.Option(help="netCDF file to write")]
+Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write, PNG or SVG")]
+Json = Annotated[bool, typer.Option("--json", help="print numbers as JSON, for scripts")]
+Layers = Annotated[int, typer.Option(help="cell layers between floor and fill height")]
+
+
+def cell_parameters(
+    delta: float | None,
+    kappa_nnn: float | None,
+    kappa_nnnn: float | None,
+    tissue: str | None = None,
+    tissues: Path = TISSUES,
+) -> CellParameters:
+    """Parameters from flags, and for those not given from the fit of a tissue.
+
+    Raises
+    ------
+    RaptorError
+        Where one is given neither way, the tissue is not known, or a value is out of bounds.
+    """
+    values = (delta, kappa_nnn, kappa_nnnn)
+    names = [field.name for field in fields(CellParameters)]
+    given = {name: value for name, value in zip(names, values, strict=True) if value is not None}
+    if tissue is not None:
+        from raptor.configuration import load_tissue
+
+        return load_tissue(tissues, tissue).parameters(tissue, given)
+    missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]
+    if missing:
+        raise RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")
+    return CellParameters(**given)
+
+
+def require_writable(output: Path, kind: str = "a netCDF file") -> None:
+    """Find out before the work, not after it, that a result cannot be written.
+
+    Raises
+    ------
+    RaptorError
+        Where the path is a folder, or its folder does not exist.
+    """
+    if output.is_dir():
+        raise RaptorError(f"{output} is a folder; give the name of {kind}")
+    folder = output.parent
+    if not folder.is_dir():
+        raise RaptorError(f"folder {folder} does not exist; create it or choose another output")
+
+
+def require_picture_writable(picture: Path | None) -> None:
+    """As `require_writable`, for a picture, whose suffix must be one of a picture's; None is fine."""
+    if picture is not None:
+        from raptor.plotting import require_picture
+
+        require_picture(picture)
+        require_writable(picture, "a picture")
+
+
+def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
+    """Print a result: a sentence for people, or its numbers as one JSON object, NaN and infinity as null."""
+    if not as_json:
+        typer.echo(sentence)
+        return
+    typer.echo(json.dumps({name: _plain(value) for name, value in numbers.items()}, indent=1))
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

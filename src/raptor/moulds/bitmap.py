@@ -1,0 +1,139 @@
+"""Moulds painted as PNG: white is outside, black or grey the depression, red a tether (docs/moulds.md).
+
+Walls run where a pixel would be half of one colour and half of the other, so that soft (anti-aliased)
+edges are read more finely than to a pixel. White spots within the depression are tethers, too.
+"""
+
+import struct
+import zlib
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+from skimage.measure import find_contours
+
+from raptor.errors import RaptorError
+from raptor.files import read_input
+from raptor.moulds.drawing import Drawing, Page
+from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
+
+WHITE = 0.9  # lightness, of 1, from which on a pixel is outside
+TINT = 0.3  # how far, of 1, green and blue may differ or exceed red
+RED = 0.25  # how far, of 1, red exceeds green and blue in a tether
+TOLERANCE = 0.5  # pixels; how far a simplified wall may leave the contour
+BLUR = 1.0  # pixels; how far drawing programs leave a wall from where it was meant
+MOST_PIXELS = 4096  # along a side
+# Pillow tells of damage by exceptions of many kinds.
+DAMAGE = (
+    OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError,
+)  # fmt: skip
+
+
+def read_bitmap(path: Path, scale: float | None = None) -> Mould:
+    """Read a PNG file that holds one mould; `scale` is l0 a pixel.
+
+    Raises
+    ------
+    RaptorError
+        Where the file is not PNG, shows no depression or several, or the mould cannot be cast.
+    """
+    path = Path(path)
+    where = f"mould file {path}"
+    colours = _colours(read_input(path, "mould file", "a PNG picture"), where)
+    rows, columns = colours.shape[:2]
+    outline, tethers = _walls(colours, where)
+    page = Page((columns - 1) / 2, -(rows - 1) / 2, max(rows, columns))
+    return Drawing(outline, tuple(tethers), page, "pixel", BLUR).mould(path, scale)
+
+
+def _colours(content: bytes, where: str) -> NDArray[np.float64]:
+    """Red, green and blue of a picture (row, column, 3), 0 to 1, on white where it is transparent."""
+    try:
+        picture = Image.open(BytesIO(content), formats=["PNG"])
+        if max(picture.size) > MOST_PIXELS:
+            raise RaptorError(
+                f"{where} is {picture.width} x {picture.height} pixels large; make it at most "
+                f"{MOST_PIXELS} a side (1,000 are plenty)"
+            )
+        if picture.mode.startswith("I"):  # 16 bits of grey
+            grey = np.asarray(picture, dtype=np.float64) / 65535
+            return np.repeat(grey[..., None], 3, axis=2)
+        layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
+    except RaptorError:
+        raise
+    except DAMAGE as error:
+        raise RaptorError(f"{where} is not PNG, or is cut short: {error}; save it again as PNG") from error
+    opacity = layers[..., 3:]
+    return np.asarray(layers[..., :3] * opacity + 1 - opacity)
+
+
+def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, list[tuple[str, Tether]]]:
+    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their places."""
+    _require_known(colours, where)
+    light, redness = colours.min(axis=2), colours[..., 0] - colours[..., 1:].max(axis=2)
+    grey = light[(light < WHITE) & (redness < RED)]
+    if grey.size == 0:
+        raise RaptorError(
+            f"{where} shows no depression; paint it black or grey on white, and the tethers in it red"
+        )
+    rim = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
+    if (rim < WHITE).all():
+        raise RaptorError(
+            f"{where} is dark all along its edge; outside is white and the depression dark, so invert the "
+            "colours, or leave a white rim"
+        )
+    reds = redness[redness >= RED]
+    red = _regions(redness - np.median(reds) / 2) if reds.size else []
+    painted = shapely.union_all(red).buffer(1)
+    bodies = [part for part in _regions((1 + np.median(grey)) / 2 - light) if not painted.covers(part)]
+    if len(bodies) != 1:
+        places = " and ".join(_place(part) for part in sorted(bodies, key=lambda part: -part.area)[:3])
+        raise RaptorError(
+            f"{where} shows {len(bodies)} dark pieces ({places}); a mould is one connected depression on "
+            "white, so join the pieces, or paint over what is none"
+        )
+    outline = shapely.Polygon(bodies[0].exterior).simplify(TOLERANCE)
+    holes = [shapely.Polygon(ring) for ring in bodies[0].interiors]
+    return outline, [(f"the tether at {_place(part)}", _tether(part, outline)) for part in [*red, *holes]]
+
+
+def _require_known(colours: NDArray[np.float64], where: str) -> None:
+    """Raise a RaptorError that names a pixel which is neither white, grey nor red, nor between these."""
+    red, green, blue = np.moveaxis(colours, 2, 0)
+    strange = (np.abs(green - blue) > TINT) | (np.maximum(green, blue) - red > TINT)
+    if strange.any():
+        row, column = (int(place) for place in np.argwhere(strange)[0])
+        colour = "#" + "".join(f"{round(255 * value):02x}" for value in colours[row, column])
+        raise RaptorError(
+            f"{where} has the colour {colour} at column {column}, row {row}; allowed are white (outside), "
+            "black or grey (depression) and red (tether)"
+        )
+
+
+def _regions(field: NDArray[np.float64]) -> list[shapely.Polygon]:
+    """Where a field (row, column) is positive: polygons, holes included, in pixels, y up."""
+    padded = np.pad(field, 1, constant_values=min(-1e-3, float(field.min())))
+    lines = [shapely.LineString(line[:, ::-1] * (1, -1) - (1, -1)) for line in find_contours(padded, 0.0)]
+    return list(shapely.get_parts(shapely.build_area(shapely.MultiLineString(lines))))
+
+
+def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> Tether:
+    """A painted region as a tether: a round post where it is round to half a pixel."""
+    centre, radius = part.centroid, float(np.sqrt(part.area / np.pi))
+    corners = shapely.get_coordinates(part)
+    post = Circle(centre.x, centre.y, radius)
+    reach = np.hypot(corners[:, 0] - centre.x, corners[:, 1] - centre.y)
+    if np.abs(reach - radius).max() < TOLERANCE and post.stands_in(outline):
+        return post
+    simple = part.simplify(TOLERANCE)
+    inside = simple.intersection(outline)  # a tether at the wall must not reach out by the tolerance
+    return PolygonTether(inside if inside.geom_type == "Polygon" and not inside.is_empty else simple)
+
+
+def _place(part: shapely.Polygon) -> str:
+    """Where a region lies, for messages."""
+    point = part.representative_point()
+    return f"column {point.x:.0f}, row {-point.y:.0f}"

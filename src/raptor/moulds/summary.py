@@ -1,0 +1,74 @@
+"""A mould in numbers."""
+
+from dataclasses import dataclass
+
+import shapely
+
+from raptor.moulds.geometry import Mould
+from raptor.moulds.random_moulds import GROUPS
+from raptor.symmetry import Element
+
+ALIKE = 0.25  # l0; how far the walls of a mould and of its image may lie apart
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a mould measures.
+
+    Parameters
+    ----------
+    mould : str
+        Its name.
+    width, height : float
+        Of the outline's bounding box along x and y, l0.
+    area : float
+        Of the depression, tethers left out, l0^2.
+    tethers : int
+        Their number.
+    symmetry : str
+        Its class, a key of `random_moulds.GROUPS`, found from its shape.
+    """
+
+    mould: str
+    width: float
+    height: float
+    area: float
+    tethers: int
+    symmetry: str
+
+
+def summarise(mould: Mould) -> Summary:
+    """Measure a mould."""
+    x0, y0, x1, y1 = mould.outline.bounds
+    return Summary(
+        mould.name, x1 - x0, y1 - y0, mould.depression.area, len(mould.tethers), symmetry_class(mould)
+    )
+
+
+def symmetry_class(mould: Mould) -> str:
+    """The largest symmetry class, a key of `random_moulds.GROUPS`, whose elements leave a mould unchanged.
+
+    Elements act about the origin; a mirror may have either axis. Walls may lie 0.25 l0 apart, so that a
+    painted mould has the class of the mould that it was painted after.
+    """
+    kept = {element for element in Element.all() if _looks_alike(mould, element)}
+    turns = (Element(0, False), Element(1, False))
+    classes = [
+        name
+        for name, group in GROUPS.items()
+        if any({turn @ element @ turn.inverse for element in group} <= kept for turn in turns)
+    ]
+    return max(classes, key=lambda name: len(GROUPS[name]))
+
+
+def _looks_alike(mould: Mould, element: Element) -> bool:
+    """Whether the walls of a mould's image under an element are those of the mould."""
+    moved = mould.transformed(element.matrix)
+    pairs = [(mould.outline, moved.outline)]
+    if mould.tethers:
+        pairs.append((_tethers(mould), _tethers(moved)))
+    return all(shapely.hausdorff_distance(ours.boundary, theirs.boundary) <= ALIKE for ours, theirs in pairs)
+
+
+def _tethers(mould: Mould) -> shapely.Geometry:
+    return shapely.union_all([tether.polygon for tether in mould.tethers])

@@ -99,6 +99,11 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     regions = pd.read_csv(results / "evaluation" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
     assert regions.loc["further: corner", "samples"] == 2
+    card = (results / "shipped" / "card.md").read_text()
+    assert "| density |" in card
+    assert "further: corner" in card
+    shipped = load_file(results / "shipped" / "weights.safetensors")
+    assert shipped.keys() == weights.keys()
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")

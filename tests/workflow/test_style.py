@@ -54,8 +54,8 @@ LAYERS = (
     ("errors", "files", "compiled", "device", "jobs", "parameters", "symmetry"), ("moulds",),
     ("condor", "morphology"),
     ("fields", "fields_batch", "metrics", "resolution"), ("dataset",), ("surrogate", "baselines"),
-    ("fitting", "enrichment", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",),
-    ("cli", "benchmark"),
+    ("fitting", "enrichment", "evaluation", "tradeoff", "configuration", "plotting"),
+    ("reference", "model_card"), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

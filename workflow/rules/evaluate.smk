@@ -122,3 +122,34 @@ rule evaluate:
         rules.summarise_evaluation.output,
         rules.compare_models.output,
         rules.measure_floor.output,
+        f"{RESULTS}/shipped/card.md",
+
+
+rule ship:
+    """The surrogate as the package ships it: weights in half precision, and a model card."""
+    input:
+        weights=SURROGATE["weights"],
+        model=SURROGATE["model"],
+        history=SURROGATE["history"],
+        summary=rules.summarise_evaluation.output.summary,
+        regions=rules.summarise_evaluation.output.regions,
+    output:
+        weights=f"{RESULTS}/shipped/weights.safetensors",
+        model=f"{RESULTS}/shipped/model.json",
+        card=report(
+            f"{RESULTS}/shipped/card.md",
+            caption="../report/model_card.rst",
+            category="Surrogate",
+        ),
+    log:
+        f"{RESULTS}/logs/ship.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/ship.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        name=CONFIG.name,
+        model=CONFIG.surrogate.model,
+    script:
+        "../scripts/ship_model.py"

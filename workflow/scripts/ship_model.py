@@ -1,0 +1,39 @@
+"""Write the surrogate as the package ships it: two files, small, and its card."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.files import atomic_path
+from raptor.jobs import logged
+from raptor.model_card import model_card
+from raptor.surrogate.files import describe, load, save
+
+with logged(snakemake.log[0]):
+    source, target = Path(snakemake.input.weights).parent, Path(snakemake.output.weights).parent
+    surrogate, description = load(source), describe(source)
+    save(
+        target,
+        [member.state_dict() for member in surrogate.members],
+        surrogate.architecture,
+        surrogate.scaling,
+        surrogate.layers,
+        surrogate.pixels,
+        {name: description[name] for name in ("training", "torch")},
+        description["identity"],
+        surrogate.calibration,
+        half=True,
+    )
+    card = model_card(
+        snakemake.params.model,
+        snakemake.params.name,
+        surrogate,
+        description,
+        pd.read_csv(snakemake.input.history),
+        json.loads(Path(snakemake.input.summary).read_text())["test"],
+        pd.read_csv(snakemake.input.regions),
+        half=True,
+    )
+    with atomic_path(Path(snakemake.output.card)) as path:
+        path.write_text(card)

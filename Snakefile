@@ -20,6 +20,7 @@ include: "workflow/rules/surrogate.smk"
 include: "workflow/rules/further.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/fit.smk"
+include: "workflow/rules/sweep.smk"
 include: "workflow/rules/tradeoff.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
@@ -31,6 +32,7 @@ localrules:
     train,
     evaluate,
     fit,
+    sweep,
     tradeoff,
     figures,
 

@@ -53,9 +53,10 @@ def test_every_rule_is_complete():
 LAYERS = (
     ("errors", "files", "compiled", "device", "jobs", "parameters", "symmetry"), ("moulds",),
     ("condor", "morphology"),
-    ("fields", "fields_batch", "metrics", "resolution"), ("dataset",), ("surrogate", "baselines"),
-    ("fitting", "enrichment", "evaluation", "tradeoff", "configuration", "plotting"),
-    ("reference", "model_card"), ("cli", "benchmark"),
+    ("fields", "fields_batch", "metrics", "orientation", "resolution"), ("dataset",),
+    ("surrogate", "baselines"),
+    ("fitting", "enrichment", "evaluation", "sweeps", "tradeoff", "configuration", "plotting"),
+    ("reference", "model_card", "report"), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

@@ -19,7 +19,7 @@ try:
     TISSUES = configuration.load_tissues(
         Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
     )
-    configuration.require_castable(CONFIG.tradeoff.cases)
+    configuration.require_castable(CONFIG.tradeoff.cases, CONFIG.sweep)
 except RaptorError as error:
     raise WorkflowError(str(error))
 config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
@@ -28,6 +28,7 @@ RESULTS = f"results/{CONFIG.name}"
 CASES = {case.name: case for case in CONFIG.tradeoff.cases}
 MODELS = CONFIG.models
 SETS = CONFIG.further_sets
+SWEEPS = CONFIG.sweep.files()
 FIGURES = (
     "design",
     "fields",
@@ -49,6 +50,7 @@ wildcard_constraints:
     model="|".join([*MODELS, *BASELINES]),
     member=r"\d+",
     set="|".join(["test", *SETS]),
+    sweep="|".join(SWEEPS),
 
 
 localrules:

@@ -9,6 +9,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from raptor.condor.lattice import cast_sites
+from raptor.configuration.sweep import Sweep
 from raptor.configuration.tradeoff import TradeoffCase
 from raptor.configuration.whole import Configuration
 from raptor.errors import RaptorError
@@ -34,8 +35,8 @@ def load(path: Path) -> Configuration:
     return parse(read_yaml(Path(path)), str(path))
 
 
-def require_castable(cases: tuple[TradeoffCase, ...]) -> None:
-    """Find out before any work that the moulds of a comparison can be read and cast.
+def require_castable(cases: tuple[TradeoffCase, ...], sweep: Sweep) -> None:
+    """Find out before any work that the moulds of a comparison and of sweeps can be read and cast.
 
     Raises
     ------
@@ -44,6 +45,8 @@ def require_castable(cases: tuple[TradeoffCase, ...]) -> None:
     """
     for case in cases:
         cast_sites(read_mould(Path(case.mould)), 1)
+    for path in sweep.moulds:
+        cast_sites(read_mould(Path(path)).scaled(sweep.mould_scale), 1)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

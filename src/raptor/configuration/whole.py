@@ -21,6 +21,7 @@ from raptor.configuration.blocks import (
     Simulation,
     Surrogate,
 )
+from raptor.configuration.sweep import Sweep
 from raptor.configuration.tradeoff import Tradeoff, TradeoffCase
 from raptor.dataset.design import DesignRules
 from raptor.device import Device
@@ -52,6 +53,7 @@ class Configuration(Block):
     )
     further: Further = Field(default_factory=lambda: Further())
     fit: Fit = Field(default_factory=lambda: Fit())
+    sweep: Sweep = Field(default_factory=lambda: Sweep())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
 
     @model_validator(mode="after")
@@ -171,6 +173,12 @@ class Configuration(Block):
         """Hash of the configuration that a further set depends on."""
         own = {"floor": self.further.seeds, "enriched": self.further.candidates}.get(name)
         return content_hash([self._depends("dataset"), name, self.further_sets[name], own])
+
+    def sweep_fingerprint(self) -> str:
+        """Hash of the configuration that simulations of sweeps depend on, model version included."""
+        own = self.sweep.model_dump(mode="json", exclude={"moulds", "panels"})
+        model = self.model.model_dump(mode="json")
+        return content_hash([self.seed, own, model, self.simulation.accuracy, MODEL_VERSION])
 
     def model_fingerprint(self, name: str) -> str:
         """Hash of the configuration that each member of a model depends on."""

@@ -23,11 +23,14 @@ from raptor.plotting.judging import (
     training_figure,
     worst_figure,
 )
+from raptor.plotting.sweeping import contraction_figure, directors_figure, panels_figure, save_panels
 
 __all__ = [
     "bulk_figure",
     "calibration_figure",
+    "contraction_figure",
     "design_figure",
+    "directors_figure",
     "draw_mould",
     "fields_figure",
     "fit_figure",
@@ -35,10 +38,12 @@ __all__ = [
     "models_figure",
     "mould_figure",
     "new_figure",
+    "panels_figure",
     "regions_figure",
     "require_picture",
     "save",
     "save_fields",
+    "save_panels",
     "save_picture",
     "show_field",
     "tradeoff_figure",

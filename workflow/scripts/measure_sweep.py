@@ -1,0 +1,23 @@
+"""Measure every simulation of a sweep."""
+
+from pathlib import Path
+
+from raptor.dataset.design import read_design
+from raptor.files import atomic_path
+from raptor.jobs import logged, progress
+from raptor.moulds import read_moulds
+from raptor.sweeps import measure
+
+with logged(snakemake.log[0]):
+    (mould,) = read_moulds(Path(snakemake.input.moulds))
+    with progress(f"sweep {mould.name}", len(read_design(Path(snakemake.input.design)))) as done:
+        table = measure(
+            map(Path, snakemake.input.shards),
+            mould,
+            snakemake.params.layers,
+            snakemake.params.pixels,
+            snakemake.params.configuration,
+            lambda simulation: done(f"simulation {simulation}"),
+        )
+    with atomic_path(Path(snakemake.output.table)) as path:
+        table.to_csv(path, index=False)

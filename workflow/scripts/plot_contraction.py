@@ -1,0 +1,15 @@
+"""Draw the contraction curves."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.files import atomic_path
+from raptor.jobs import logged
+from raptor.plotting import contraction_figure, save
+
+with logged(snakemake.log[0]):
+    table = pd.read_csv(snakemake.input.table)
+    save(contraction_figure(table), Path(snakemake.output.png).with_suffix(""))
+    with atomic_path(Path(snakemake.output.data)) as path:
+        table.to_csv(path, index=False)

@@ -13,6 +13,7 @@ from raptor.dataset.design import Run
 from raptor.dataset.shards import Record, read_shard
 from raptor.dataset.stack import record_fields
 from raptor.dataset.sweep import Grid
+from raptor.errors import RaptorError
 from raptor.morphology import shape_ratios
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
@@ -64,7 +65,8 @@ def measure(
         row |= {"converged": record.converged, "folded_fraction": record.folded_fraction}
         rows.append(row)
         done(record.simulation)
-    return pd.DataFrame(rows)
+    columns = ["simulation", "seed", *POINT, *SHAPES, "converged", "folded_fraction"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def predict(
@@ -112,8 +114,7 @@ def compare(mould: str, simulated: pd.DataFrame, predicted: pd.DataFrame) -> pd.
         table["held"] = table["difference"].abs() <= table["band95"]
         tables.append(table.reset_index().assign(mould=mould, measure=measure_name))
     joined = pd.concat(tables, ignore_index=True)
-    columns = [str(name) for name in joined.columns if name not in ("mould", "measure")]
-    return joined[["mould", "measure", *columns]]
+    return joined.set_index(["mould", "measure", *POINT]).reset_index()
 
 
 def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -126,7 +127,7 @@ def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
         known = part.dropna(subset=["difference"])
         entry: dict[str, Any] = {"mould": str(mould), "measure": str(measure_name), "points": len(known)}
         if len(known):
-            worst = known.loc[known["difference"].abs().idxmax()]
+            worst = known.sort_values("difference", key=np.abs).iloc[-1]
             entry["largest"] = {
                 name: float(worst[name])
                 for name in (*POINT, "simulated", "predicted", "band95", "difference")
@@ -178,7 +179,7 @@ def tissues(
     Raises
     ------
     RaptorError
-        As `read_shard`.
+        As `read_shard`, and where all of them failed.
     """
     first: dict[Point, Run] = {}
     for run in runs:
@@ -191,4 +192,8 @@ def tissues(
             predicted = surrogate.predict_mould(mould, record.parameters)
             point = wanted[record.simulation]
             found[point] = Tissue(point, simulated, predicted)
+    if not found:
+        raise RaptorError(
+            f"every simulation of {mould.name} that is to be drawn failed; see the logs of simulate_sweep for why"
+        )
     return [found[point] for point in points if point in found]

@@ -17,6 +17,8 @@ EVERYTHING = {
     "plot_worst", "plot_models", "ship",
     "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
     "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",
+    "design_sweep", "simulate_sweep", "measure_sweep", "predict_sweep", "compare_sweep", "plot_contraction",
+    "plot_panels", "plot_directors", "write_report",
 }  # fmt: skip
 
 
@@ -36,11 +38,12 @@ def test_a_second_run_has_nothing_to_do(place):
 
 
 def test_a_lost_report_is_written_again(place):
-    report = place.folder / "results" / "tiny" / "report.html"
-    report.unlink()
-    assert place.jobs() == {"report", "all"}
-    assert place.run("--cores", "1").returncode == 0
-    assert report.stat().st_size > 10**5
+    folder = place.folder / "results" / "tiny"
+    for name, jobs in (("workflow.html", set()), ("report.html", {"write_report"})):
+        (folder / name).unlink()
+        assert place.jobs() == jobs | {"report", "all"}
+        assert place.run("--cores", "1").returncode == 0
+        assert (folder / name).stat().st_size > 10**5
 
 
 def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
@@ -49,7 +52,8 @@ def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
     path = tmp_path / "tissues.yaml"
     path.write_text(yaml.safe_dump(tissues))
     jobs = place.jobs(configuration=variant(tmp_path, fit__tissues_file=str(path)))
-    assert jobs == {"record_configuration", "fit_tissue", "tabulate_fits", "plot_fit", "report", "all"}
+    fitted = {"fit_tissue", "tabulate_fits", "plot_fit"}
+    assert jobs == fitted | {"record_configuration", "write_report", "report", "all"}
 
 
 @pytest.mark.parametrize(
@@ -60,6 +64,7 @@ def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
             {"sample_design", "simulate_shard", "build_stack", "check_dataset"},
         ),
         ({"fields__pixels": 64}, {"sample_design", "simulate_shard"}),
+        ({"sweep__seeds": 2}, {"simulate_shard", "train_member", "fit_tissue", "measure_tradeoff"}),
         ({"tradeoff__seeds": 5}, {"simulate_shard", "train_member", "fit_tissue", "plot_fit"}),
         ({"simulation__accuracy": "standard"}, {"sample_design", "compile_kernels", "plot_design"}),
         ({"seed": 1}, {"compile_kernels"}),
@@ -78,9 +83,16 @@ def test_targets_make_their_part(workplace):
     assert "evaluate_model" not in place.jobs("train")
     assert {"evaluate_model", "train_member"} <= place.jobs("evaluate")
     assert {"fit_tissue", "plot_fit"} <= place.jobs("fit")
+    assert {"simulate_sweep", "plot_contraction", "plot_panels", "plot_directors"} <= place.jobs("sweep")
     assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
     assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
     assert place.jobs("report") == EVERYTHING - {"all"}
+
+
+def test_parts_that_are_not_asked_for_are_left_out(workplace, tmp_path):
+    jobs = workplace("no_sweep").jobs(configuration=variant(tmp_path, sweep__moulds=[]))
+    assert {name for name in EVERYTHING - jobs if "sweep" in name} == {n for n in EVERYTHING if "sweep" in n}
+    assert "write_report" in jobs
 
 
 def test_a_gpu_s_profile_asks_for_it_where_it_is_used(workplace):

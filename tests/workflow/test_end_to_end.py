@@ -26,7 +26,8 @@ def results(finished):
 
 
 def test_the_run_ends_with_the_report(results):
-    text = (results / "report.html").read_text()
+    assert (results / "report.html").stat().st_size > 10**5
+    text = (results / "workflow.html").read_text()
     for name in (
         "fields.png",
         "bulk.png",
@@ -34,6 +35,9 @@ def test_the_run_ends_with_the_report(results):
         "tradeoff.png",
         "design.png",
         "fit_glial_1.png",
+        "contraction.png",
+        "panels_i_shape.png",
+        "directors.png",
     ):
         assert name in text
     for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv"):
@@ -59,6 +63,7 @@ def test_every_file_says_what_it_is(results):
         *results.glob("simulations/*.nc"),
         *results.glob("dataset/*.nc"),
         *results.glob("fits/*.nc"),
+        *results.glob("sweeps/*/*.nc"),
     ]:
         with netCDF4.Dataset(path) as file:
             for name in (
@@ -116,10 +121,28 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert summary.loc["anneal-20", "energy_above_best"] > summary.loc["reference", "energy_above_best"]
 
 
+def test_sweeps_are_simulated_and_predicted_at_every_point(results):
+    table = pd.read_csv(results / "sweeps" / "contraction.csv")
+    assert len(table) == 2 * 2 * 4  # moulds, measures, points
+    assert set(table["mould"]) == {"four_post_rectangle", "i_shape"}
+    assert table[["simulated", "predicted", "band95"]].notna().all().all()
+    assert ((table["delta"] == 0.9) & (table["kappa_nnn"] == 0.1) & (table["ratio"] == 0.1)).any()
+    weak, strong = (table[table["delta"] == delta]["simulated"].mean() for delta in (0.2, 0.9))
+    assert strong > weak + 10
+    found = json.loads((results / "sweeps" / "differences.json").read_text())
+    assert [(entry["mould"], entry["measure"]) for entry in found] == list(
+        dict.fromkeys(zip(table["mould"], table["measure"], strict=True))
+    )
+    largest = table.groupby(["mould", "measure"])["difference"].apply(lambda part: part.abs().max())
+    for entry in found:
+        there = largest[entry["mould"], entry["measure"]]
+        assert abs(entry["largest"]["difference"]) == pytest.approx(there)
+
+
 def test_every_figure_has_its_data(results):
     for figure in (
         "design", "fields", "bulk", "training", "calibration", "regions", "worst", "models", "tradeoff",
-        "folding", "fit_glial_1",
+        "folding", "fit_glial_1", "contraction", "panels_four_post_rectangle", "panels_i_shape", "directors",
     ):  # fmt: skip
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made

@@ -1,11 +1,11 @@
-"""The report, written when a run ends: a rule cannot write the report of its own workflow."""
+"""The report, and Snakemake's own, written when a run ends: a rule cannot write the report of its own workflow."""
 
 # Snakemake's --report-after-run would write it after dry runs too, and to one place for every
-# configuration. Here a stamp is the last thing that a run makes; the report follows it, and a
-# stamp without its report is dropped, so that a lost report is written again.
-REPORT = Path(RESULTS) / "report.html"
+# configuration. Here a stamp is the last thing that a run makes; that report follows it, and a
+# stamp without it is dropped, so that a lost one is written again.
+TECHNICAL = Path(RESULTS) / "workflow.html"
 STAMP = Path(RESULTS) / "report.stamp"
-if STAMP.exists() and not REPORT.exists() and "--report" not in sys.argv:
+if STAMP.exists() and not TECHNICAL.exists() and "--report" not in sys.argv:
     STAMP.unlink()
 
 
@@ -13,16 +13,38 @@ localrules:
     report,
 
 
-rule report:
-    """The report, and all that it shows."""
+rule write_report:
+    """The report that is read from the top, with every figure and number inside."""
     input:
         rules.record_configuration.output,
         rules.dataset.input,
         rules.train.input,
         rules.evaluate.input,
         rules.fit.input,
+        rules.sweep.input,
         rules.tradeoff.input,
         rules.figures.input,
+        template=f"{workflow.basedir}/workflow/report/report.html.jinja",
+    output:
+        report=f"{RESULTS}/report.html",
+    log:
+        f"{RESULTS}/logs/write_report.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/write_report.tsv"
+    threads: 1
+    resources:
+        mem_mb=800,
+    params:
+        model_version=MODEL_VERSION,
+    script:
+        "../scripts/write_report.py"
+
+
+rule report:
+    """The reports, and all that they show."""
+    input:
+        rules.write_report.input,
+        rules.write_report.output,
     output:
         stamp=touch(str(STAMP)),
     log:
@@ -36,10 +58,11 @@ rule report:
 
 onsuccess:
     if STAMP.exists() and (
-        not REPORT.exists() or REPORT.stat().st_mtime < STAMP.stat().st_mtime
+        not TECHNICAL.exists() or TECHNICAL.stat().st_mtime < STAMP.stat().st_mtime
     ):
         shell(
             "{sys.executable} -m snakemake --quiet --snakefile {workflow.main_snakefile}"
-            " --configfile {RESULTS}/configuration.yaml --report {RESULTS}/report.part.html"
-            " && mv {RESULTS}/report.part.html {REPORT} && echo 'Report: {REPORT}' >&2"
+            " --configfile {RESULTS}/configuration.yaml --report {RESULTS}/workflow.part.html"
+            " && mv {RESULTS}/workflow.part.html {TECHNICAL}"
+            " && echo 'Report: {RESULTS}/report.html' >&2"
         )

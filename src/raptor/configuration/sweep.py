@@ -18,7 +18,7 @@ class Sweep(Block):
     mould_scale: float = Field(
         0.7, gt=0, le=1.1, description="moulds are drawn at this fraction of their size"
     )
-    deltas: tuple[float, ...] = Field((0.1, 0.3, 0.5, 0.7, 0.9), min_length=1, description="values of delta")
+    deltas: tuple[float, ...] = Field((0.1, 0.5, 0.9), min_length=1, description="values of delta")
     kappa_nnn: tuple[float, ...] = Field(
         (0.1, 0.7), min_length=1, description="values of kappa_nnn, in kappa0"
     )

@@ -24,7 +24,9 @@ MEASURE_LABELS = {
     "width": r"decrease of the central width, $100\,(1 - w/w_0)$ (%)",
     "area": r"decrease of the area, $100\,(1 - A/A_0)$ (%)",
 }
+RATIO = r"$\kappa_{NNNN}/\kappa_{NNN}$"
 SOURCES = ("simulated", "predicted")
+APART = 0.006  # of Delta, by which points of one Delta are drawn beside each other
 RIM = 1.5  # l0 shown about a mould
 
 
@@ -48,9 +50,11 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
     for column, mould in enumerate(moulds):
         for axes, measure in zip(grid[:, column], MEASURE_LABELS, strict=True):
             part = table[(table["mould"] == mould) & (table["measure"] == measure)]
-            for (kappa, ratio), curve in part.groupby(["kappa_nnn", "ratio"]):
+            curves = part.groupby(["kappa_nnn", "ratio"])
+            for number, ((kappa, ratio), curve) in enumerate(curves):
                 style = ratios.index(ratio) % len(LINES)
-                _curve(axes, curve.sort_values("delta"), colours[kappa], style)
+                apart = APART * (number - (len(curves) - 1) / 2)
+                _curve(axes, curve.sort_values("delta"), colours[kappa], style, apart)
             if column == 0:
                 axes.set_ylabel(MEASURE_LABELS[measure])
         grid[0, column].set_title(str(mould).replace("_", " "))
@@ -59,14 +63,15 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int) -> None:
-    """One set of spring constants: simulated points, predicted line and band."""
+def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int, apart: float) -> None:
+    """One set of spring constants: simulated points, predicted line and band, which ends at 0 and 100 %."""
     delta, predicted, band = curve["delta"], curve["predicted"], curve["band95"]
-    axes.fill_between(delta, predicted - band, predicted + band, color=colour, alpha=0.12, lw=0)
+    low, high = ((predicted + side * band).clip(0, 100) for side in (-1, 1))
+    axes.fill_between(delta, low, high, color=colour, alpha=0.12, lw=0)
     axes.plot(delta, predicted, LINES[style], color=colour, lw=1.4)
     axes.errorbar(
-        delta, curve["simulated"], curve["spread"].fillna(0.0), fmt=MARKERS[style], color=colour, ms=4,
-        mfc="white", capsize=2, lw=1,
+        delta + apart, curve["simulated"], curve["spread"].fillna(0.0), fmt=MARKERS[style], color=colour,
+        ms=4, mfc="white", capsize=2, lw=1,
     )  # fmt: skip
 
 
@@ -78,7 +83,7 @@ def _legend(figure: Figure, colours: Mapping[float, Any], ratios: Sequence[float
     ]
     for number, ratio in enumerate(ratios):
         style = {"ls": LINES[number % 4], "marker": MARKERS[number % 4], "mfc": "white"}
-        label = rf"$\kappa_{{NNNN}}/\kappa_{{NNN}}$ = {ratio:g}"
+        label = f"{RATIO} = {ratio:g}"
         handles.append(Line2D([], [], color="black", ms=4, label=label, **cast(Any, style)))
     point: Any = {"ls": "", "marker": "o", "mfc": "white", "color": "black", "ms": 4}
     handles.append(Line2D([], [], label="simulated (bar: deviation over seeds)", **point))
@@ -96,7 +101,7 @@ def panels_figure(tissues: Sequence[Tissue], mould: Mould) -> Figure:
     width = 1.0 + 2.2 * len(kappas) * len(deltas)
     figure = new_figure(width, 0.8 + 2 * len(ratios) * (2.0 * shape + 0.15))
     shown: Any = None
-    blocks: list[Any] = list(np.atleast_1d(cast(Any, figure.subfigures(1, len(deltas)))))
+    *blocks, margin = cast(Any, figure.subfigures(1, len(deltas) + 1, width_ratios=[8] * len(deltas) + [1]))
     for delta, block in zip(deltas, blocks, strict=True):
         grid = block.subplots(2 * len(ratios), len(kappas), squeeze=False)
         block.suptitle(rf"$\Delta$ = {delta:g}")
@@ -111,9 +116,8 @@ def panels_figure(tissues: Sequence[Tissue], mould: Mould) -> Figure:
                 pair[0].set_title(rf"$\kappa_{{NNN}}$ = {kappas[column]:g}", fontsize=8)
             if column == 0:
                 for axes, source in zip(pair, SOURCES, strict=True):
-                    axes.set_ylabel(f"ratio {ratios[row]:g}\n{source}", fontsize=7)
-        if block is blocks[-1]:
-            block.colorbar(shown, ax=grid, shrink=0.5, label="density per pixel", aspect=30)
+                    axes.set_ylabel(f"{RATIO} = {ratios[row]:g}\n{source}", fontsize=7)
+    margin.colorbar(shown, cax=margin.add_axes((0.1, 0.25, 0.22, 0.5)), label="density per pixel")
     return figure
 
 
@@ -142,7 +146,7 @@ def directors_figure(rows: Sequence[tuple[Tissue, Mould]], threshold: float) -> 
             draw_directors(axes, found)
             axes.set_title(f"{source}, mean anisotropy {np.nanmean(found.anisotropy):.2f}", fontsize=8)
         delta, kappa, ratio = tissue.point
-        values = rf"$\Delta$ = {delta:g}, $\kappa_{{NNN}}$ = {kappa:g}, ratio {ratio:g}"
+        values = rf"$\Delta$ = {delta:g}, $\kappa_{{NNN}}$ = {kappa:g}, {RATIO} = {ratio:g}"
         pair[0].set_ylabel(f"{mould.name.replace('_', ' ')}\n{values}", fontsize=7)
     figure.colorbar(shown, ax=grid, shrink=0.5, label="density per pixel")
     return figure
@@ -151,12 +155,14 @@ def directors_figure(rows: Sequence[tuple[Tissue, Mould]], threshold: float) -> 
 def draw_directors(axes: Axes, found: Directors) -> None:
     """Each director as a line, as long as its square is wide where anisotropy is 1."""
     x, y = np.meshgrid(found.centres, found.centres)
-    length = np.nan_to_num(found.anisotropy) * (found.centres[1] - found.centres[0])
-    across, up = length * np.cos(found.angle), length * np.sin(found.angle)
+    tissue = np.isfinite(found.anisotropy)
+    x, y, angle = x[tissue], y[tissue], found.angle[tissue]
+    length = found.anisotropy[tissue] * (found.centres[1] - found.centres[0])
+    across, up = length * np.cos(angle), length * np.sin(angle)
     plain: Any = {"headwidth": 0, "headlength": 0, "headaxislength": 0, "pivot": "mid"}
     axes.quiver(
         x, y, across, up, angles="xy", scale_units="xy", scale=1, color="white", edgecolor="black",
-        linewidth=0.35, width=0.004, **plain,
+        linewidth=0.25, width=0.0022, zorder=0.9, **plain,
     )  # fmt: skip
 
 

@@ -1,0 +1,10 @@
+"""Write the report that is read from the top."""
+
+from pathlib import Path
+
+from raptor.jobs import logged
+from raptor.report import write_report
+
+with logged(snakemake.log[0]):
+    path = Path(snakemake.output.report)
+    write_report(path, Path(snakemake.input.template), path.parent, map(Path, snakemake.input))

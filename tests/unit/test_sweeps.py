@@ -127,7 +127,7 @@ def test_a_sweep_of_failed_simulations_has_no_difference(swept):
 
 def test_curves_are_drawn_a_panel_a_mould_and_measure(swept):
     figure = contraction_figure(pd.concat([swept, swept.assign(mould="two")]))
-    assert [axes.get_title() for axes in figure.axes[:2]] == ["one", "two"]
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["One", "Two"]
     assert len(figure.axes) == 4
 
 

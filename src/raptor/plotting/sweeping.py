@@ -57,7 +57,7 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
                 _curve(axes, curve.sort_values("delta"), colours[kappa], style, apart)
             if column == 0:
                 axes.set_ylabel(MEASURE_LABELS[measure])
-        grid[0, column].set_title(str(mould).replace("_", " "))
+        grid[0, column].set_title(str(mould).replace("_", " ").capitalize())
         grid[1, column].set_xlabel(r"cell-matrix interaction $\Delta$")
     _legend(figure, colours, ratios)
     return figure
@@ -147,7 +147,7 @@ def directors_figure(rows: Sequence[tuple[Tissue, Mould]], threshold: float) -> 
             axes.set_title(f"{source}, mean anisotropy {np.nanmean(found.anisotropy):.2f}", fontsize=8)
         delta, kappa, ratio = tissue.point
         values = rf"$\Delta$ = {delta:g}, $\kappa_{{NNN}}$ = {kappa:g}, {RATIO} = {ratio:g}"
-        pair[0].set_ylabel(f"{mould.name.replace('_', ' ')}\n{values}", fontsize=7)
+        pair[0].set_ylabel(f"{mould.name.replace('_', ' ').capitalize()}\n{values}", fontsize=7)
     figure.colorbar(shown, ax=grid, shrink=0.5, label="density per pixel")
     return figure
 

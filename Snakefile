@@ -42,3 +42,4 @@ rule all:
     default_target: True
     input:
         rules.report.output,
+        rules.write_report.output,  # named, or it would not be made again when lost

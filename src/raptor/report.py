@@ -94,10 +94,11 @@ def number(value: Any, digits: int = 2) -> str:
         return f"{value:,}"
     if value == 0:
         return "0"
+    value = float(f"{value:.{digits - 1}e}")
     places = digits - 1 - math.floor(math.log10(abs(value)))
     if places > digits + 3:
         return f"{value:.{digits - 1}e}"
-    return f"{round(value, places):,.{max(0, places)}f}"
+    return f"{value:,.{max(0, places)}f}"
 
 
 def percent(share: Any, digits: int = 0) -> str:

@@ -9,6 +9,8 @@ from html.parser import HTMLParser
 
 import pytest
 
+from raptor.report import number
+
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 LOADS = {"src", "srcset", "poster", "data", "background"}
 PROBE = """<script>
@@ -123,7 +125,7 @@ def test_the_report_reads_from_the_question_to_the_rebuilding(results):
 def test_captions_quote_the_run(results):
     text = (results / "report.html").read_text()
     (width, *_) = json.loads((results / "sweeps" / "differences.json").read_text())
-    assert f"{abs(width['largest']['difference']):.2g}" in text
+    assert f"{number(abs(width['largest']['difference']))} (Four post rectangle, central width)" in text
     metrics = json.loads((results / "evaluation" / "metrics.json").read_text())
     assert f"{100 * metrics['test']['fields']['density']['vrmse']:.0f} %" in text
     assert not re.search(r"\b(nan|None)\b", re.sub(r"<pre>.*?</pre>|base64,[^\"]*", "", text, flags=re.DOTALL))

@@ -2,11 +2,13 @@
 
 # Snakemake's --report-after-run would write it after dry runs too, and to one place for every
 # configuration. Here a stamp is the last thing that a run makes; that report follows it, and a
-# stamp without it is dropped, so that a lost one is written again.
+# stamp without both reports is dropped, so that a lost one is written again.
+REPORT = Path(RESULTS) / "report.html"
 TECHNICAL = Path(RESULTS) / "workflow.html"
 STAMP = Path(RESULTS) / "report.stamp"
-if STAMP.exists() and not TECHNICAL.exists() and "--report" not in sys.argv:
-    STAMP.unlink()
+if STAMP.exists() and "--report" not in sys.argv:
+    if not (REPORT.exists() and TECHNICAL.exists()):
+        STAMP.unlink()
 
 
 localrules:
@@ -26,7 +28,7 @@ rule write_report:
         rules.figures.input,
         template=f"{workflow.basedir}/workflow/report/report.html.jinja",
     output:
-        report=f"{RESULTS}/report.html",
+        report=str(REPORT),
     log:
         f"{RESULTS}/logs/write_report.log",
     benchmark:
@@ -64,5 +66,5 @@ onsuccess:
             "{sys.executable} -m snakemake --quiet --snakefile {workflow.main_snakefile}"
             " --configfile {RESULTS}/configuration.yaml --report {RESULTS}/workflow.part.html"
             " && mv {RESULTS}/workflow.part.html {TECHNICAL}"
-            " && echo 'Report: {RESULTS}/report.html' >&2"
+            " && echo 'Report: {REPORT}' >&2"
         )

@@ -28,6 +28,7 @@ RESULTS = f"results/{CONFIG.name}"
 CASES = {case.name: case for case in CONFIG.tradeoff.cases}
 MODELS = CONFIG.models
 SETS = CONFIG.further_sets
+JUDGED = ["test", *(name for name in ("bars", "slender", "corner") if name in SETS)]
 FIGURES = (
     "design",
     "fields",

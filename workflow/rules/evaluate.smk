@@ -57,6 +57,7 @@ rule compare_models:
             *expand(rules.evaluate_model.output.metrics, model=MODELS, set="test"),
             *expand(rules.evaluate_baseline.output.metrics, model=BASELINES),
         ],
+        judged=expand(rules.evaluate_model.output.metrics, model=MODELS, set=JUDGED),
         weights=expand(rules.assemble_model.output.weights, model=MODELS),
         histories=expand(rules.assemble_model.output.history, model=MODELS),
         floor=rules.measure_floor.output.floor,
@@ -67,6 +68,11 @@ rule compare_models:
             category="Surrogate",
         ),
         summary=f"{RESULTS}/evaluation/models.json",
+        regions=report(
+            f"{RESULTS}/evaluation/models_by_region.csv",
+            caption="../report/models_by_region.rst",
+            category="Surrogate",
+        ),
     log:
         f"{RESULTS}/logs/compare_models.log",
     benchmark:
@@ -86,7 +92,7 @@ rule summarise_evaluation:
         metrics=expand(
             rules.evaluate_model.output.metrics,
             model=CONFIG.surrogate.model,
-            set=["test", *(name for name in SETS if name != "floor")],
+            set=JUDGED,
         ),
         floor=rules.measure_floor.output.floor,
     output:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from raptor.evaluation import compare, summarise
+from raptor.evaluation import compare, regions_of, summarise
 from raptor.files import atomic_path
 from raptor.jobs import logged
 from raptor.surrogate.costs import costs_of
@@ -22,6 +22,12 @@ with logged(snakemake.log[0]):
     costs += [{"model": name} for name in names[len(costs) :]]
     tables = zip(names, snakemake.input.metrics, strict=True)
     summaries = {name: summarise(pd.read_csv(metrics), floor) for name, metrics in tables}
+    judged: dict[str, dict[str, pd.DataFrame]] = {}
+    for metrics in map(Path, snakemake.input.judged):
+        judged.setdefault(metrics.parent.name, {})[metrics.stem] = pd.read_csv(metrics)
+    regions = [regions_of(found).assign(model=name) for name, found in judged.items()]
+    with atomic_path(Path(snakemake.output.regions)) as path:
+        pd.concat(regions).to_csv(path, index=False)
     with atomic_path(Path(snakemake.output.table)) as path:
         compare(summaries, costs).to_csv(path, index=False)
     with atomic_path(Path(snakemake.output.summary)) as path:

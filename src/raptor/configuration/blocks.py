@@ -158,10 +158,10 @@ class Surrogate(Block):
         ge=0,
         description="weight of the discriminator's judgement, 0 without one; null: 1, or 0 but for pix2pix",
     )
-    loss: Literal["l1", "relative"] | None = Field(
-        None,
+    loss: Literal["l1", "relative"] = Field(
+        "l1",
         description="distance to the target: mean absolute error, or root mean square error over the "
-        "target's deviation, a sample and field; null: l1 for pix2pix, else relative",
+        "target's deviation, a sample and field",
     )
     pixels: Literal[16, 32, 64, 128, 256] | None = Field(
         None,

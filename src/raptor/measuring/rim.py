@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.ndimage import binary_fill_holes, binary_opening, label, map_coordinates
+from scipy.ndimage import binary_closing, binary_erosion, binary_fill_holes, binary_opening, label, map_coordinates
 from scipy.optimize import least_squares
 from skimage.measure import find_contours
+from skimage.segmentation import watershed
 
 from raptor.errors import RaptorError
 from raptor.measuring.light import find_plate, log_brightness
@@ -23,12 +24,15 @@ SMOOTHING = 1.5  # pixels
 ANGLES = 120  # directions tried
 SPACING = 0.25  # l0, between points on the mould's edges
 CORNER = 0.6  # l0 around a corner, where blur moves the edge
-REACHES = (2.0, 1.0, 0.6, 0.6)  # l0 to either side in which an edge is sought, in turn
+WIDE, CLOSE = (2.5, 1.0, 1.0), (0.6, 0.4, 0.4)  # l0 to either side in which an edge is sought, in turn
+BLURRED = 6  # pixels in which the rim's slope from plate to floor lies
+GAP = 4  # pixels; what looks like plate and is as narrow is no plate
 EDGE = 6.0  # times the plate's slopes: the least slope of an edge
-MIN_OVERLAP = 0.85  # of the region found and the outline, intersection over union
+MIN_OVERLAP = 0.85, 0.95  # of the region found and the outline, before and after the fit
 MIN_SEEN = 0.6  # of the rim
 NEAR = 0.3  # l0; an edge counts as the mould's within it
-MAX_RESIDUAL = 0.15  # l0, root mean square of the edges that count
+MAX_RESIDUAL = 0.1  # l0, root mean square of the edges that count
+MIN_SCALE = 8.0  # pixels per l0; below it a tissue near the rim is not told from it
 ADVICE = "show the whole mould with plate around it, or give --landmark or --aligned"
 
 
@@ -40,6 +44,10 @@ class Edges:
     normals: NDArray[np.float64]
     rim: NDArray[np.bool_]
 
+    def of_rim(self) -> "Edges":
+        """Those of the rim alone."""
+        return Edges(self.points[self.rim], self.normals[self.rim], self.rim[self.rim])
+
 
 def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) -> Registration:
     """Register a photograph (row, column) by the rim of the depression.
@@ -49,24 +57,34 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     RaptorError
         Where no rim is seen, or what is seen does not have the mould's shape.
     """
-    log = log_brightness(values, SMOOTHING)
-    plate, flat, _ = find_plate(log)
-    start = _overlay_region(_region(plate), mould, mirrored)
-    slopes = np.hypot(*np.gradient(flat))
-    least = EDGE * float(np.median(slopes[plate]))
+    plate, flat, _ = find_plate(log_brightness(values, SMOOTHING))
+    # Of brightness itself, for the steepest slope of its logarithm lies on an edge's dark side.
+    even = np.exp(flat)
+    slopes = np.hypot(*np.gradient(even))
+    region = _region(plate, slopes)
+    polygon = _as_polygon(region)
+    found = _start(polygon, mould, mirrored)
     edges = mould_edges(mould)
-    found = start
-    for reach in REACHES:
-        offsets = _edge_offsets(flat, edges, found, reach, least)
-        found = _fit(found, edges, offsets)
-    offsets = _edge_offsets(flat, edges, found, REACHES[-1], least)
-    near = np.abs(offsets) < NEAR
-    seen = float(near[edges.rim].mean())
-    residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
-    if seen < MIN_SEEN or residual > MAX_RESIDUAL:
+    # First to the region's boundary alone: a tissue near the rim has stronger edges.
+    rim = edges.of_rim()
+    for reach in WIDE:
+        found = _fit(found, rim, _edge_offsets(region.astype(float), rim, found, reach, 0.1))
+    least = EDGE * float(np.median(slopes[plate]))
+    for reach in CLOSE:
+        found = _fit(found, edges, _edge_offsets(even, edges, found, reach, least))
+    if found.scale < MIN_SCALE:
         raise RaptorError(
-            f"{mould.name} cannot be registered: {100 * seen:.0f} % of its rim is seen with a residual of "
-            f"{residual:.2f} l0; {100 * MIN_SEEN:.0f} % and {MAX_RESIDUAL} l0 are needed, so {ADVICE}"
+            f"the mould is small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} are "
+            "needed; photograph it from nearer, or give --landmark"
+        )
+    _require_overlap(_overlap(found, mould, polygon), MIN_OVERLAP[1], mould)
+    offsets = _edge_offsets(even, rim, found, CLOSE[-1], least)
+    near = np.abs(offsets) < NEAR
+    residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
+    if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
+        raise RaptorError(
+            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, with a residual "
+            f"of {residual:.2f} l0; {100 * MIN_SEEN:.0f} % and {MAX_RESIDUAL} l0 are needed, so {ADVICE}"
         )
     return Registration(found.matrix, "rim", residual)
 
@@ -96,20 +114,28 @@ def _edge_points(polygon: shapely.Polygon) -> tuple[NDArray[np.float64], NDArray
     return at[straight], normal[straight]
 
 
-def _region(plate: NDArray[np.bool_]) -> shapely.Polygon:
-    """The largest thing that is not plate, holes filled, as a polygon (column, row)."""
-    there = binary_fill_holes(binary_opening(~plate, iterations=2))
-    pieces, count = label(there)
-    if count == 0:
-        raise RaptorError(f"no mould is seen: the image shows one surface; {ADVICE}")
+def _region(plate: NDArray[np.bool_], slopes: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """The largest thing (row, column) that is not plate, gaps and holes filled, out to the steepest slope."""
+    there = binary_opening(np.pad(~plate, GAP), iterations=2)
+    there = binary_fill_holes(binary_closing(there, iterations=GAP))[GAP:-GAP, GAP:-GAP]
+    pieces, _ = label(there)
     sizes = np.bincount(pieces.ravel())
     sizes[0] = 0
-    largest = np.pad(pieces == sizes.argmax(), 1)
-    contour = max(find_contours(largest.astype(float), 0.5), key=len) - 1
+    largest = pieces == sizes.argmax()
+    core = binary_erosion(largest, iterations=BLURRED) & (sizes.max() > 0)
+    if not core.any():
+        raise RaptorError(f"no mould is seen: the image shows one surface; {ADVICE}")
+    markers = np.where(core, 1, 0) + np.where(largest, 0, 2)
+    return np.asarray(watershed(slopes, markers) == 1)
+
+
+def _as_polygon(region: NDArray[np.bool_]) -> shapely.Polygon:
+    """The boundary of a region (row, column), as a polygon (column, row)."""
+    contour = max(find_contours(np.pad(region, 1).astype(float), 0.5), key=len) - 1
     return shapely.Polygon(contour[:, ::-1]).buffer(0).simplify(0.5)
 
 
-def _overlay_region(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registration:
+def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registration:
     """The mould's outline with the region's area and centre, in the direction of most overlap."""
     scale = np.sqrt(region.area / mould.outline.area)
     flip = np.diag([1.0, 1.0 if mirrored else -1.0])
@@ -117,25 +143,35 @@ def _overlay_region(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Re
     best, found = 0.0, None
     for angle in np.arange(ANGLES) * 2 * np.pi / ANGLES:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        linear = scale * turn @ flip
         matrix = np.eye(3)
-        matrix[:2, :2], matrix[:2, 2] = linear, centre - linear @ middle
+        matrix[:2, :2] = scale * turn @ flip
+        matrix[:2, 2] = centre - matrix[:2, :2] @ middle
         candidate = Registration(matrix, "rim", float("nan"))
-        shape = shapely.transform(mould.outline, candidate.to_pixels)
-        common = shape.intersection(region).area
-        overlap = common / (shape.area + region.area - common)
+        overlap = _overlap(candidate, mould, region)
         if overlap > best + 1e-3:  # of a symmetric mould, the first direction
             best, found = overlap, candidate
-    if found is None or best < MIN_OVERLAP:
-        raise RaptorError(
-            f"what is seen does not have the shape of {mould.name}: it overlaps with it by "
-            f"{100 * best:.0f} %, at least {100 * MIN_OVERLAP:.0f} % is needed; {ADVICE}"
-        )
+    _require_overlap(best, MIN_OVERLAP[0], mould)
+    assert found is not None
     return found
 
 
+def _overlap(registration: Registration, mould: Mould, region: shapely.Polygon) -> float:
+    """Intersection over union of the outline and the region found."""
+    shape = shapely.transform(mould.outline, registration.to_pixels)
+    common = shape.intersection(region).area
+    return float(common / (shape.area + region.area - common))
+
+
+def _require_overlap(overlap: float, least: float, mould: Mould) -> None:
+    if overlap < least:
+        raise RaptorError(
+            f"what is seen does not have the shape of {mould.name}: it overlaps with it by "
+            f"{100 * overlap:.0f} %, at least {100 * least:.0f} % is needed; {ADVICE}"
+        )
+
+
 def _edge_offsets(
-    flat: NDArray[np.float64], edges: Edges, registration: Registration, reach: float, least: float
+    image: NDArray[np.float64], edges: Edges, registration: Registration, reach: float, least: float
 ) -> NDArray[np.float64]:
     """How far along its normal each edge point (n,) meets the steepest slope, l0; NaN without one."""
     step = 0.5 / registration.scale
@@ -143,7 +179,7 @@ def _edge_offsets(
     along = np.arange(-count, count + 1) * step
     points = edges.points[:, None] + along[:, None] * edges.normals[:, None]
     columns, rows = np.moveaxis(registration.to_pixels(points.reshape(-1, 2)).reshape(points.shape), -1, 0)
-    profile = map_coordinates(flat, [rows, columns], order=1, mode="nearest")
+    profile = map_coordinates(image, [rows, columns], order=1, mode="nearest")
     slope = np.abs(np.gradient(profile, 0.5, axis=1))  # per pixel
     top = 1 + slope[:, 1:-1].argmax(axis=1)
     each = np.arange(len(top))

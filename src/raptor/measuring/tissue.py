@@ -19,9 +19,10 @@ from raptor.measuring.registration import Registration
 from raptor.morphology import outline_ratios
 from raptor.moulds import Mould
 
-MARGIN = 0.5  # l0 on either side of rim and tethers that is not read: blur and shadow reach so far
+MARGIN = 0.25, 4.0  # l0, and pixels, by rim and tethers that are not read: shadow and blur reach so far
 SMOOTHING = 0.12  # l0, Gaussian, at least a pixel
 SPECK = 0.005  # of the depression's area: smaller pieces and holes are noise
+RIM_SHADOW = 0.5  # l0 outside the rim that is not taken for plate
 ROUNDS = 6  # of splitting the surfaces and fitting the light to them
 DEGREE = 4  # of the light's polynomial, where surfaces are known everywhere
 MIN_CONTRAST = 3.5  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
@@ -91,9 +92,10 @@ def measure(
         told apart, the threshold is not among the brightnesses seen, or a mask leaves the depression.
     """
     size = picture.values.shape
-    inside = registration.covers(mould.outline.buffer(-MARGIN), size)
+    margin = max(MARGIN[0], MARGIN[1] / registration.scale)
+    inside = registration.covers(mould.outline.buffer(-margin), size)
     for tether in mould.tethers:
-        inside &= ~registration.covers(tether.polygon.buffer(MARGIN), size)
+        inside &= ~registration.covers(tether.polygon.buffer(margin), size)
     _require_in_picture(mould, registration, size, inside)
     if picture.mask:
         tissue = Tissue.BRIGHT if tissue is Tissue.AUTO else tissue
@@ -106,13 +108,16 @@ def measure(
         brightness = _smooth_within(corrected, inside, sigma)
         level, contrast = _threshold(brightness[inside], threshold)
         if tissue is Tissue.AUTO:
-            band = inside & ~registration.covers(mould.outline.buffer(-MARGIN - RIM_BAND), size)
+            band = inside & ~registration.covers(mould.outline.buffer(-margin - RIM_BAND), size)
             tissue = _look(brightness > level, inside, band)
     outline = _outline(brightness, level, tissue, registration)
     if picture.mask:
         _require_inside(outline, mould)
-    outline = without_specks(outline.intersection(mould.depression), SPECK * mould.depression.area)
-    if outline.is_empty:
+    # What a tether parts from the rest is no speck.
+    joined = shapely.union_all([outline.intersection(mould.outline), *(t.polygon for t in mould.tethers)])
+    joined = without_specks(joined, SPECK * mould.depression.area)
+    outline = joined.intersection(mould.depression)
+    if outline.area < SPECK * mould.depression.area:
         raise RaptorError(
             f"no tissue is found at threshold {level:.3g} ({tissue.value} tissue); look at --threshold and --tissue"
         )
@@ -130,7 +135,7 @@ def even_brightness(
     """
     log = log_brightness(values, max(1.0, SMOOTHING * registration.scale))
     plate, flat, _ = find_plate(log)
-    plate &= ~registration.covers(mould.outline.buffer(MARGIN), log.shape)
+    plate &= ~registration.covers(mould.outline.buffer(RIM_SHADOW), log.shape)
     labels = np.where(plate, PLATE, IGNORED).astype(np.int8)
     for _ in range(ROUNDS):
         split = threshold_otsu(flat[inside])

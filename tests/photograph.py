@@ -85,7 +85,9 @@ def contracted(mould, waist, shrink, waves=0.0, seed=0):
     def pull(points):
         half_x, half_y = np.abs(mould.outline.bounds).reshape(2, 2).max(axis=0)
         u, v = points[:, 0] / half_x, points[:, 1] / half_y
-        ripple = sum(np.cos(k * np.arctan2(v, u) + phase) for k, phase in zip((3, 5, 7, 9), phases, strict=True))
+        ripple = sum(
+            np.cos(k * np.arctan2(v, u) + phase) for k, phase in zip((3, 5, 7, 9), phases, strict=True)
+        )
         ripple = 1 + waves * ripple / 2
         return np.column_stack(
             [

@@ -1,5 +1,6 @@
-"""The command line: raptor simulate | predict | check | trace | same | progress | well | reference."""
+"""raptor simulate | predict | measure | check | trace | same | progress | well | reference."""
 
+import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -181,10 +182,59 @@ def reference(
         typer.echo(path)
 
 
+@app.command(name="measure")
+def measure_tissue(
+    image: Annotated[Path, typer.Argument(help="photograph, or mask of two values (PNG, TIFF, JPEG)")],
+    mould: Annotated[Path, typer.Option(help="mould file (GeoJSON, one feature; lengths in l0)")],
+    tissue: Annotated[str, typer.Option(help="bright, dark or auto: how it looks beside the floor")] = "auto",
+    threshold: Annotated[
+        float | None, typer.Option(help="brightness that parts tissue and floor, over the plate's; Otsu's")
+    ] = None,
+    landmark: Annotated[
+        list[str] | None, typer.Option(help='"column,row=x,y" or "column,row=tether 1"; twice or more')
+    ] = None,
+    aligned: Annotated[
+        bool, typer.Option("--aligned", help="the image is the mould's, 62.5 l0 wide")
+    ] = False,
+    mirrored: Annotated[bool, typer.Option("--mirrored", help="taken from below or in a mirror")] = False,
+    overlay: Annotated[Path | None, typer.Option(help="PNG to write, to check by eye")] = None,
+    outline: Annotated[Path | None, typer.Option(help="GeoJSON of the tissue's outline to write, l0")] = None,
+    as_record: Annotated[bool, typer.Option("--json", help="print the result as JSON")] = False,
+) -> None:
+    """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask.
+
+    Example: raptor measure photograph.png --mould config/moulds/four_post_rectangle.geojson
+    --overlay overlay.png --outline tissue.geojson
+    """
+    from raptor.files import atomic_path
+    from raptor.measuring import measure, read_picture, register, tissue_named
+    from raptor.measuring.report import as_feature, as_json, as_sentence
+    from raptor.moulds import read_mould
+
+    look, shape = tissue_named(tissue), read_mould(mould)
+    for output in filter(None, (overlay, outline)):
+        _require_writable(output)
+    picture = read_picture(image)
+    registration = register(picture, shape, landmark or (), aligned, mirrored)
+    measured = measure(picture, shape, registration, look, threshold)
+    if overlay is not None:
+        from raptor.measuring.overlay import write_overlay
+
+        write_overlay(overlay, picture, shape, measured)
+    if outline is not None:
+        with atomic_path(outline) as temporary:
+            feature = as_feature(measured, picture, shape)
+            temporary.write_text(json.dumps(feature) + "\n", encoding="utf-8")
+    if as_record:
+        typer.echo(json.dumps(as_json(measured, picture, shape)))
+    else:
+        typer.echo(f"{image}: {as_sentence(measured, picture)}")
+
+
 def _require_writable(output: Path) -> None:
     """Find out before the work, not after it, that the result cannot be written."""
     if output.is_dir():
-        raise RaptorError(f"{output} is a folder; give the name of a netCDF file")
+        raise RaptorError(f"{output} is a folder; give the name of a file")
     folder = output.parent
     if not folder.is_dir():
         raise RaptorError(f"folder {folder} does not exist; create it or choose another output")

@@ -54,7 +54,8 @@ LAYERS = (
     ("errors", "files", "compiled", "device", "jobs", "parameters", "symmetry"), ("moulds",),
     ("condor", "morphology"),
     ("fields", "fields_batch", "metrics", "resolution"), ("dataset",), ("surrogate",),
-    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("reference",), ("cli", "benchmark"),
+    ("fitting", "evaluation", "tradeoff", "configuration", "plotting"), ("measuring", "reference"),
+    ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

@@ -6,13 +6,24 @@ from raptor.errors import RaptorError
 from raptor.measuring.pictures import Picture, as_picture, read_picture
 from raptor.measuring.registration import Registration, aligned, from_landmarks, parse_landmarks
 from raptor.measuring.rim import find_rim
-from raptor.measuring.tissue import Measurement, Tissue, as_feature, as_json, measure
+from raptor.measuring.tissue import Measurement, Tissue, measure, tissue_named
 from raptor.moulds import Mould
 
 __all__ = [
-    "Measurement", "Picture", "Registration", "Tissue", "aligned", "as_feature", "as_json", "as_picture",
-    "find_rim", "from_landmarks", "measure", "parse_landmarks", "read_picture", "register",
-]  # fmt: skip
+    "Measurement",
+    "Picture",
+    "Registration",
+    "Tissue",
+    "aligned",
+    "as_picture",
+    "find_rim",
+    "from_landmarks",
+    "measure",
+    "parse_landmarks",
+    "read_picture",
+    "register",
+    "tissue_named",
+]
 
 
 def register(

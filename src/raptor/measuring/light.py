@@ -53,7 +53,8 @@ def fit_light(
         kept = np.abs(misses) <= TRIMMED * np.std(misses[kept]) + 1e-12
     coefficients = np.zeros((degree + 1, degree + 1))
     coefficients[tuple(np.transpose(powers))] = solution[: len(powers)]
-    return legendre.leggrid2d(rows, columns, coefficients), solution[len(powers) :]
+    light = np.asarray(legendre.leggrid2d(rows, columns, coefficients), dtype=np.float64)
+    return light, np.asarray(solution[len(powers) :], dtype=np.float64)
 
 
 def find_plate(log: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64], float]:

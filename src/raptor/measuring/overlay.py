@@ -72,7 +72,7 @@ def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
         "tissue": seen[(seen > measurement.threshold) == bright],
         "floor": seen[(seen > measurement.threshold) != bright],
     }
-    bins = np.linspace(*np.percentile(seen, [0, 100]), 80)
+    bins = np.linspace(seen.min(), seen.max(), 80)
     for (name, values), colour in zip(sides.items(), (PREDICTED, SIMULATED), strict=True):
         axes.hist(values, bins=list(bins), color=colour, label=name)
     axes.axvline(measurement.threshold, color=THIRD, ls="--", label=f"threshold {measurement.threshold:.3g}")
@@ -80,7 +80,9 @@ def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
     axes.legend(frameon=False, fontsize=7)
 
 
-def _draw(axes: Axes, line: shapely.Geometry, registration: Registration, colour: str, **style: object) -> None:
+def _draw(
+    axes: Axes, line: shapely.Geometry, registration: Registration, colour: str, **style: object
+) -> None:
     options = {"linewidth": 0.9, "color": colour} | style
     axes.plot(*registration.to_pixels(shapely.get_coordinates(line)).T, **options)  # type: ignore[arg-type]
 

@@ -53,7 +53,9 @@ def read_picture(path: Path) -> Picture:
     if pixels.ndim != 2:
         raise RaptorError(f"{path} holds an array of shape {pixels.shape}; give one picture, not a stack")
     if min(pixels.shape) < SMALLEST_SIDE:
-        raise RaptorError(f"{path} is {pixels.shape[1]} x {pixels.shape[0]}; {SMALLEST_SIDE} pixels are needed")
+        raise RaptorError(
+            f"{path} is {pixels.shape[1]} x {pixels.shape[0]}; {SMALLEST_SIDE} pixels are needed"
+        )
     return as_picture(pixels, str(path))
 
 

@@ -112,8 +112,8 @@ def from_landmarks(
     if residual > MAX_LANDMARK_RESIDUAL:
         worst = int(np.argmax(np.linalg.norm(misses, axis=1))) + 1
         raise RaptorError(
-            f"the landmarks do not fit the mould: residual {residual:.2f} l0, at most {MAX_LANDMARK_RESIDUAL} "
-            f"is allowed; look at landmark {worst} first, and at --mirrored"
+            f"the landmarks do not fit the mould: residual {residual:.2f} l0, at most "
+            f"{MAX_LANDMARK_RESIDUAL} is allowed; look at landmark {worst} first, and at --mirrored"
         )
     return Registration(matrix, "landmarks", residual)
 

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing, binary_erosion, binary_fill_holes, binary_opening, label, map_coordinates
+from scipy.ndimage import (
+    binary_closing,
+    binary_erosion,
+    binary_fill_holes,
+    binary_opening,
+    label,
+    map_coordinates,
+)
 from scipy.optimize import least_squares
 from skimage.measure import find_contours
 from skimage.segmentation import watershed
@@ -83,8 +90,8 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
     if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
         raise RaptorError(
-            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, with a residual "
-            f"of {residual:.2f} l0; {100 * MIN_SEEN:.0f} % and {MAX_RESIDUAL} l0 are needed, so {ADVICE}"
+            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, with a "
+            f"residual of {residual:.2f} l0; {100 * MIN_SEEN:.0f} % and {MAX_RESIDUAL} l0 are needed; {ADVICE}"
         )
     return Registration(found.matrix, "rim", residual)
 
@@ -141,14 +148,15 @@ def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registratio
     flip = np.diag([1.0, 1.0 if mirrored else -1.0])
     centre, middle = (shapely.get_coordinates(shape.centroid)[0] for shape in (region, mould.outline))
     best, found = 0.0, None
-    for angle in np.arange(ANGLES) * 2 * np.pi / ANGLES:
+    angles = np.arange(-ANGLES // 2, ANGLES // 2) * 2 * np.pi / ANGLES
+    for angle in sorted(angles, key=abs):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         matrix = np.eye(3)
         matrix[:2, :2] = scale * turn @ flip
         matrix[:2, 2] = centre - matrix[:2, :2] @ middle
         candidate = Registration(matrix, "rim", float("nan"))
         overlap = _overlap(candidate, mould, region)
-        if overlap > best + 1e-3:  # of a symmetric mould, the first direction
+        if overlap > best + 1e-3:  # of a symmetric mould, the least turn
             best, found = overlap, candidate
     _require_overlap(best, MIN_OVERLAP[0], mould)
     assert found is not None
@@ -200,7 +208,9 @@ def _fit(registration: Registration, edges: Edges, offsets: NDArray[np.float64])
 
     def misses(change: NDArray[np.float64]) -> NDArray[np.float64]:
         a, b, dx, dy = change
-        moved = np.column_stack([a * points[:, 0] - b * points[:, 1] + dx, b * points[:, 0] + a * points[:, 1] + dy])
+        moved = np.column_stack(
+            [a * points[:, 0] - b * points[:, 1] + dx, b * points[:, 0] + a * points[:, 1] + dy]
+        )
         return np.asarray(np.sum(moved * normals, axis=1) - wanted)
 
     a, b, dx, dy = least_squares(misses, np.zeros(4), loss="cauchy", f_scale=0.1).x

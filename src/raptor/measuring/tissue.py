@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from typing import Any
 
 import numpy as np
 import shapely
@@ -25,7 +24,7 @@ SPECK = 0.005  # of the depression's area: smaller pieces and holes are noise
 RIM_SHADOW = 0.5  # l0 outside the rim that is not taken for plate
 ROUNDS = 6  # of splitting the surfaces and fitting the light to them
 DEGREE = 4  # of the light's polynomial, where surfaces are known everywhere
-MIN_CONTRAST = 3.5  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
+MIN_CONTRAST = 4.0  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
 RIM_BAND = 1.5  # l0 along the rim, where a tissue that contracts leaves the floor bare
 MAX_OUTSIDE = 0.05  # of a mask's tissue
 PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the two is tissue shows later
@@ -37,6 +36,14 @@ class Tissue(StrEnum):
     BRIGHT = "bright"
     DARK = "dark"
     AUTO = "auto"
+
+
+def tissue_named(name: str) -> Tissue:
+    """The look of a name; raises a RaptorError for another than bright, dark and auto."""
+    try:
+        return Tissue(name)
+    except ValueError:
+        raise RaptorError(f"tissue is {name}; allowed are bright, dark and auto") from None
 
 
 @dataclass(frozen=True)
@@ -116,10 +123,12 @@ def measure(
     # What a tether parts from the rest is no speck.
     joined = shapely.union_all([outline.intersection(mould.outline), *(t.polygon for t in mould.tethers)])
     joined = without_specks(joined, SPECK * mould.depression.area)
-    outline = joined.intersection(mould.depression)
+    parts = shapely.get_parts(joined.intersection(mould.depression))
+    outline = shapely.union_all(parts[shapely.area(parts) > 0])  # where two tethers touch, a line is left
     if outline.area < SPECK * mould.depression.area:
         raise RaptorError(
-            f"no tissue is found at threshold {level:.3g} ({tissue.value} tissue); look at --threshold and --tissue"
+            f"no tissue is found at threshold {level:.3g} ({tissue.value} tissue); "
+            "look at --threshold and --tissue"
         )
     area, width = outline_ratios(outline, mould)
     return Measurement(outline, area, width, level, tissue, contrast, brightness, inside, registration)
@@ -154,35 +163,6 @@ def without_specks(shape: shapely.Geometry, least: float) -> shapely.Geometry:
             for piece in pieces
         ]
     )
-
-
-def as_feature(measurement: Measurement, mould: Mould) -> dict[str, Any]:
-    """The outline, in l0, and what was measured, as a GeoJSON feature."""
-    return {
-        "type": "Feature",
-        "geometry": shapely.geometry.mapping(measurement.outline),
-        "properties": as_json(measurement, mould),
-    }
-
-
-def as_json(measurement: Measurement, mould: Mould) -> dict[str, Any]:
-    """What was measured, for a machine: NaN becomes null."""
-    registration = measurement.registration
-    values: dict[str, float] = {
-        "area_ratio": measurement.area_ratio,
-        "width_ratio": measurement.width_ratio,
-        "threshold": measurement.threshold,
-        "contrast": measurement.contrast,
-        "residual": registration.residual,
-        "pixels_per_l0": registration.scale,
-        "angle": registration.angle,
-    }
-    return {
-        "mould": mould.name,
-        "tissue": measurement.tissue.value,
-        "registration": registration.method,
-        **{key: float(value) if np.isfinite(value) else None for key, value in values.items()},
-    }
 
 
 def _smooth_within(
@@ -223,7 +203,9 @@ def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.
     """Bright or dark: the floor is what lies along the rim more than elsewhere."""
     along, elsewhere = float(above[band].mean()), float(above[inside & ~band].mean())
     if abs(along - elsewhere) < 0.1 * max(along, elsewhere):
-        raise RaptorError("it cannot be seen which surface is the tissue; give --tissue bright or --tissue dark")
+        raise RaptorError(
+            "it cannot be seen which surface is the tissue; give --tissue bright or --tissue dark"
+        )
     return Tissue.DARK if along > elsewhere else Tissue.BRIGHT
 
 

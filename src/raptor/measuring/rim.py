@@ -40,7 +40,7 @@ MIN_SEEN = 0.6  # of the rim
 NEAR = 0.3  # l0; an edge counts as the mould's within it
 MAX_RESIDUAL = 0.1  # l0, root mean square of the edges that count
 MIN_SCALE = 8.0  # pixels per l0; below it a tissue near the rim is not told from it
-ADVICE = "show the whole mould with plate around it, or give --landmark or --aligned"
+ADVICE = "show the whole mould with plate around it, try --mirrored, or give --landmark or --aligned"
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,9 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
     if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
         raise RaptorError(
-            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, with a "
-            f"residual of {residual:.2f} l0; {100 * MIN_SEEN:.0f} % and {MAX_RESIDUAL} l0 are needed; {ADVICE}"
+            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, at least "
+            f"{100 * MIN_SEEN:.0f} % is needed, with a residual of {residual:.2f} l0, at most {MAX_RESIDUAL} "
+            f"is allowed; {ADVICE}"
         )
     return Registration(found.matrix, "rim", residual)
 

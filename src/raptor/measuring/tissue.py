@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
+from functools import partial, reduce
 
 import numpy as np
 import shapely
@@ -22,6 +22,7 @@ MARGIN = 0.25, 4.0  # l0, and pixels, by rim and tethers that are not read: shad
 SMOOTHING = 0.12  # l0, Gaussian, at least a pixel
 SPECK = 0.005  # of the depression's area: smaller pieces and holes are noise
 RIM_SHADOW = 0.5  # l0 outside the rim that is not taken for plate
+GRAIN = 0.01  # l0^2: smaller rings of a contour are not even looked at
 ROUNDS = 6  # of splitting the surfaces and fitting the light to them
 DEGREE = 4  # of the light's polynomial, where surfaces are known everywhere
 MIN_CONTRAST = 4.0  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
@@ -215,10 +216,10 @@ def _outline(
     """What lies on the tissue's side of a level, as polygons in l0 between pixels."""
     signed = (brightness - level) * (1 if tissue is Tissue.BRIGHT else -1)
     signed = np.pad(signed, 1, constant_values=-float(np.abs(signed).max()))
-    rings = [ring[:, ::-1] - 1 for ring in find_contours(signed, 0.0) if len(ring) > 3]
-    shapes = [shapely.Polygon(registration.to_mould(ring)).buffer(0) for ring in rings]
+    rings = [registration.to_mould(ring[:, ::-1] - 1) for ring in find_contours(signed, 0.0) if len(ring) > 3]
+    shapes = [shape for ring in rings if (shape := shapely.Polygon(ring).buffer(0)).area > GRAIN]
     # Contours do not cross, so a ring within a ring is a hole, and one within a hole a piece.
-    return shapely.symmetric_difference_all([shape for shape in shapes if not shape.is_empty])
+    return reduce(shapely.symmetric_difference, shapes, shapely.Polygon())
 
 
 def _require_in_picture(

@@ -61,6 +61,12 @@ def test_both_ratios_of_a_known_tissue_are_found_within_a_hundredth(case):
     assert found.tissue is (Tissue.BRIGHT if looks_bright else Tissue.DARK)
 
 
+def test_a_drawing_without_noise_is_measured():
+    drawn = replace(CAMERA, noise=0.0, blur=0.5, unevenness=0.0, texture=0.0)
+    found = measured(photograph(MOULD, TISSUE, drawn))
+    assert (found.area_ratio, found.width_ratio) == pytest.approx(outline_ratios(TISSUE, MOULD), abs=0.003)
+
+
 def test_the_outline_lies_on_the_tissues_edge(pixels):
     found = measured(pixels)
     edge = found.outline.difference(MOULD.outline.exterior.buffer(0.5)).boundary

@@ -15,6 +15,7 @@ MOST_PIXELS = 30_000  # that a fit uses
 TRIMMED = 3.0  # standard deviations; what lies farther off is left out of the next fit
 FRAME = 0.03  # of the shorter side: the strip along the picture's edge that shows the plate
 PLATE = 5.0  # standard deviations within which a pixel looks like the plate
+LEAST_SPREAD = 0.002  # half a level of 8 bits; a picture without noise has its rounding
 IGNORED = -1
 
 
@@ -75,7 +76,7 @@ def find_plate(log: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.
     for degree in (2, 2, 3, 3):  # a thin frame determines no more than degree 3
         light, levels = fit_light(log, np.where(plate, 0, IGNORED).astype(np.int8), degree)
         flat = log - light - levels[0]
-        spread = float(1.4826 * np.median(np.abs(flat[plate])))
+        spread = max(LEAST_SPREAD, float(1.4826 * np.median(np.abs(flat[plate]))))
         pieces, _ = label(np.abs(flat) < PLATE * spread)
         edge = np.concatenate([pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]])
         plate = np.isin(pieces, np.unique(edge[edge > 0]))

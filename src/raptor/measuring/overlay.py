@@ -76,7 +76,9 @@ def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
     for (name, values), colour in zip(sides.items(), (PREDICTED, SIMULATED), strict=True):
         axes.hist(values, bins=list(bins), color=colour, label=name)
     axes.axvline(measurement.threshold, color=THIRD, ls="--", label=f"threshold {measurement.threshold:.3g}")
-    axes.set(xlabel="brightness / plate's, light evened", ylabel="pixels of the depression", yticks=[])
+    axes.set(
+        xlabel="brightness over that of the plate, light evened", ylabel="pixels of the depression", yticks=[]
+    )
     axes.legend(frameon=False, fontsize=7)
 
 

@@ -82,7 +82,7 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     if found.scale < MIN_SCALE:
         raise RaptorError(
             f"the mould is small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} are "
-            "needed; photograph it from nearer, or give --landmark"
+            "needed; photograph it from nearer, cut the image out around it, or give --landmark"
         )
     _require_overlap(_overlap(found, mould, polygon), MIN_OVERLAP[1], mould)
     offsets = _edge_offsets(even, rim, found, CLOSE[-1], least)

@@ -39,6 +39,7 @@ class Camera:
     tissue: float = 1.3
     post: float = 0.5
     texture: float = 0.05
+    wall: float = 0.0  # width of a dark band around the rim, l0
 
     @property
     def registration(self):
@@ -71,6 +72,8 @@ def photograph(mould, tissue, camera, seed=0):
     cloth = gaussian_filter(rng.normal(size=camera.size), 3)
     cloth = camera.tissue * (1 + camera.texture * cloth / cloth.std())
     scene = np.ones(camera.size)
+    if camera.wall > 0:
+        scene += coverage(mould.outline.buffer(camera.wall, join_style="mitre"), camera) * (0.4 - scene)
     layers = [(mould.outline, camera.floor), (tissue.intersection(mould.outline), cloth)]
     for shape, brightness in [*layers, *((tether.polygon, camera.post) for tether in mould.tethers)]:
         scene += coverage(shape, camera) * (brightness - scene)

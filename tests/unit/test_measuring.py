@@ -190,6 +190,16 @@ def test_what_cannot_be_measured_is_refused(pixels):
         register(as_picture(pixels, "picture"), MOULD, is_aligned=True)
 
 
+@pytest.mark.parametrize("width", [0.4, 0.8])
+def test_a_wall_seen_as_a_band_is_refused_and_measured_by_landmarks(width):
+    walled = replace(CAMERA, wall=width)
+    picture = as_picture(photograph(MOULD, TISSUE, walled), "picture")
+    with pytest.raises(RaptorError, match="shows a second edge"):
+        register(picture, MOULD)
+    found = measure(picture, MOULD, register(picture, MOULD, tethers_seen(walled)))
+    assert (found.area_ratio, found.width_ratio) == pytest.approx(outline_ratios(TISSUE, MOULD), abs=0.01)
+
+
 def test_the_mirror_image_of_a_mould_without_mirrors_needs_to_be_said():
     corners = [(-24, -12), (20, -12), (24, 2), (6, 13), (-10, 8), (-24, 12)]
     mould = Mould(shapely.Polygon(corners), (Circle(-18, -6, 1.5), Circle(15, -6, 1.5)), name="skew")

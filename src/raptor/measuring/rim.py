@@ -19,6 +19,7 @@ from scipy.ndimage import (
     map_coordinates,
 )
 from scipy.optimize import least_squares
+from scipy.signal import find_peaks
 from skimage.measure import find_contours
 from skimage.segmentation import watershed
 
@@ -39,6 +40,9 @@ MIN_OVERLAP = 0.85, 0.95  # of the region found and the outline, before and afte
 MIN_SEEN = 0.6  # of the rim
 NEAR = 0.3  # l0; an edge counts as the mould's within it
 MAX_RESIDUAL = 0.1  # l0, root mean square of the edges that count
+BAND = 0.9  # l0 to either side of the rim in which there may be no second edge
+BAND_PART = 0.35  # of the rim, along which there is one
+SECOND_EDGE = 0.2  # of the rim's slope
 MIN_SCALE = 8.0  # pixels per l0; below it a tissue near the rim is not told from it
 ADVICE = "show the whole mould with plate around it, try --mirrored, or give --landmark or --aligned"
 
@@ -94,6 +98,7 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
             f"{100 * MIN_SEEN:.0f} % is needed, with a residual of {residual:.2f} l0, at most {MAX_RESIDUAL} "
             f"is allowed; {ADVICE}"
         )
+    _require_one_edge(even, rim, found, mould)
     return Registration(found.matrix, "rim", residual)
 
 
@@ -179,17 +184,42 @@ def _require_overlap(overlap: float, least: float, mould: Mould) -> None:
         )
 
 
+def _slopes_across(
+    image: NDArray[np.float64], edges: Edges, registration: Registration, reach: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places along the normals (m,), l0, and the image's slope there (n, m), per pixel."""
+    step = 0.5 / registration.scale
+    count = int(np.ceil(reach / step)) + 1
+    along = np.arange(-count, count + 1, dtype=np.float64) * step
+    points = edges.points[:, None] + along[:, None] * edges.normals[:, None]
+    columns, rows = np.moveaxis(registration.to_pixels(points.reshape(-1, 2)).reshape(points.shape), -1, 0)
+    profile = map_coordinates(image, [rows, columns], order=1, mode="nearest")
+    return along, np.asarray(np.gradient(profile, 0.5, axis=1), dtype=np.float64)
+
+
+def _require_one_edge(
+    even: NDArray[np.float64], rim: Edges, registration: Registration, mould: Mould
+) -> None:
+    """Refuse a wall seen as a band: a second edge at one distance along much of the rim."""
+    along, slopes = _slopes_across(even, rim, registration, BAND)
+    # Of rising and of falling slopes, what a part of the rim is above.
+    common = np.abs(np.percentile(slopes, [100 * BAND_PART, 100 * (1 - BAND_PART)], axis=0)).max(axis=0)
+    apart = np.abs(along) > max(NEAR, BLURRED / 2 / registration.scale)
+    peaks, _ = find_peaks(common, height=SECOND_EDGE * common.max())
+    second = along[[peak for peak in peaks if apart[peak]]]
+    if len(second):
+        raise RaptorError(
+            f"the rim of {mould.name} shows a second edge, {abs(second[0]):.1f} l0 from the first: its wall "
+            "is seen as a band, or the tissue follows it closely; give --landmark at posts or corners"
+        )
+
+
 def _edge_offsets(
     image: NDArray[np.float64], edges: Edges, registration: Registration, reach: float, least: float
 ) -> NDArray[np.float64]:
     """How far along its normal each edge point (n,) meets the steepest slope, l0; NaN without one."""
-    step = 0.5 / registration.scale
-    count = int(np.ceil(reach / step)) + 1
-    along = np.arange(-count, count + 1) * step
-    points = edges.points[:, None] + along[:, None] * edges.normals[:, None]
-    columns, rows = np.moveaxis(registration.to_pixels(points.reshape(-1, 2)).reshape(points.shape), -1, 0)
-    profile = map_coordinates(image, [rows, columns], order=1, mode="nearest")
-    slope = np.abs(np.gradient(profile, 0.5, axis=1))  # per pixel
+    along, slope = _slopes_across(image, edges, registration, reach)
+    slope, step = np.abs(slope), along[1] - along[0]
     top = 1 + slope[:, 1:-1].argmax(axis=1)
     each = np.arange(len(top))
     left, middle, right = (slope[each, top + k] for k in (-1, 0, 1))

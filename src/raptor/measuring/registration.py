@@ -32,7 +32,7 @@ class Registration:
     matrix : array (3, 3)
         Takes (x, y, 1) in l0 to (column, row, 1).
     method : str
-        "rim", "landmarks" or "aligned".
+        "rim", "landmarks" or "frame", the picture's own.
     residual : float
         Root mean square distance between what was seen and where it should lie, l0; NaN where
         nothing is left to compare.
@@ -50,7 +50,7 @@ class Registration:
     @property
     def angle(self) -> float:
         """Direction of the mould's x axis in the picture, degrees counter-clockwise."""
-        return float(np.degrees(np.arctan2(-self.matrix[1, 0], self.matrix[0, 0])))
+        return float(np.degrees(np.arctan2(-self.matrix[1, 0], self.matrix[0, 0]))) + 0.0  # no -0
 
     def to_pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 2) in l0 as columns and rows (n, 2)."""
@@ -85,7 +85,7 @@ def aligned(size: tuple[int, ...]) -> Registration:
         )
     scale, middle = rows / IMAGE_SIZE, (rows - 1) / 2
     matrix = np.array([[scale, 0, middle], [0, -scale, middle], [0, 0, 1]])
-    return Registration(matrix, "aligned", float("nan"))
+    return Registration(matrix, "frame", float("nan"))
 
 
 def from_landmarks(

@@ -1,4 +1,7 @@
-"""Area and width of a tissue, from its density (paper, "Model parameters and predictive capability")."""
+"""Area and width of a tissue (paper, "Model parameters and predictive capability").
+
+From its density, as simulated or predicted, or from its outline, as measured.
+"""
 
 import numpy as np
 import shapely
@@ -60,9 +63,7 @@ def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -
     The ends of the tissue are found by linear interpolation of the density between samples.
     """
     section = central_section(mould)
-    cast = float(section.intersection(mould.depression).length)
-    if cast < 1e-9:
-        return float("nan")
+    cast = _cast_width(section, mould)
     pixels = density.shape[-1]
     step = pixel_size(pixels) / SAMPLES_PER_PIXEL
     # The centre is a sample, so that a mould and its mirror image are sampled alike.
@@ -75,6 +76,19 @@ def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -
     rows, columns = (middle + c / pixel_size(pixels) for c in (y, x))
     values = map_coordinates(density, [rows, columns], order=1, mode="constant", cval=0.0)
     return float(_length_above(values - threshold) * step / cast)
+
+
+def outline_ratios(tissue: shapely.Geometry, mould: Mould) -> tuple[float, float]:
+    """A/A0 and w/w0 of a tissue given by its outline, l0; w/w0 is NaN where `width_ratio` is."""
+    section = central_section(mould)
+    width = float(section.intersection(tissue).length)
+    return float(tissue.area / mould.depression.area), width / _cast_width(section, mould)
+
+
+def _cast_width(section: shapely.LineString, mould: Mould) -> float:
+    """Length of depression on the section, l0; NaN without any."""
+    length = float(section.intersection(mould.depression).length)
+    return length if length >= 1e-9 else float("nan")
 
 
 def _length_above(excess: NDArray[np.floating]) -> float:

@@ -55,7 +55,7 @@ LAYERS = (
     ("condor", "morphology"),
     ("fields", "fields_batch", "metrics", "resolution"), ("dataset",), ("surrogate", "baselines"),
     ("fitting", "enrichment", "evaluation", "tradeoff", "configuration", "plotting"),
-    ("reference", "model_card"), ("cli", "benchmark"),
+    ("reference", "model_card", "measuring"), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

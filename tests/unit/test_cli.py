@@ -201,7 +201,8 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     assert "unlike the training set" in done.stdout
     with xr.open_dataset(output) as prediction:
         assert prediction["fields"].dims == ("sample", "field", "y", "x")
-        assert prediction["fields_band"].dims == ("sample", "level", "field", "y", "x")
+        assert prediction["fields_std"].dims == prediction["fields"].dims
+        assert (prediction["fields_std"] > 0).all()
         assert float(prediction["delta"][0]) == 0.5
         assert float(prediction["area_ratio_band"][0, 2]) >= 0.3
     assert raptor("check", output).returncode == 0

@@ -82,7 +82,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     history = pd.read_csv(results / "surrogate" / "compact" / "training.csv")
     assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
-    metrics = json.loads((results / "evaluation" / "metrics.json").read_text())
+    metrics = json.loads((results / "evaluation" / "compact" / "metrics.json").read_text())
     assert set(metrics) == {"test", "corner"}
     assert metrics["test"]["samples"] == 2
     assert set(metrics["test"]["bulk"]) == {
@@ -96,7 +96,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert models.index.tolist() == ["compact", "pix2pix", "nearest", "mean"]
     assert (models.loc[["compact", "pix2pix"], "training_core_minutes"] > 0).all()
     assert models["density_in_floors"].notna().all()
-    regions = pd.read_csv(results / "evaluation" / "regions.csv").set_index("region")
+    regions = pd.read_csv(results / "evaluation" / "compact" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
     assert regions.loc["further: corner", "samples"] == 2
     card = (results / "shipped" / "card.md").read_text()

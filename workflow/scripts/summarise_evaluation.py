@@ -1,4 +1,4 @@
-"""Gather the surrogate's errors: test split, regions of the parameters, further sets."""
+"""Gather a model's errors: test split, regions of the parameters, further sets."""
 
 import json
 from pathlib import Path

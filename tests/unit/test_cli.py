@@ -208,6 +208,27 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     assert raptor("check", output).returncode == 0
 
 
+def test_the_shipped_model_predicts_without_training(tmp_path):
+    from raptor.surrogate.files import SHIPPED
+
+    size = sum(path.stat().st_size for path in SHIPPED.iterdir())
+    assert size < 20e6
+    output, picture = tmp_path / "prediction.nc", tmp_path / "prediction.png"
+    mould = ROOT / "config" / "moulds" / "four_post_rectangle.geojson"
+    done = raptor(
+        "predict", mould, *options(), "--output", output, "--picture", picture, "--json"
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert 0 < found["width_ratio"] < 1
+    assert 0 < found["area_ratio"] < 1
+    assert found["area_ratio_band95"] > 0
+    assert picture.stat().st_size > 10_000
+    with xr.open_dataset(output) as prediction:
+        assert dict(prediction.sizes)["x"] == 256
+    assert raptor("check", output).returncode == 0
+
+
 def test_check_takes_moulds_and_tables(made, tmp_path):
     for path in (MOULD, made / "design" / "design.csv", made / "dataset" / "normalisation.json"):
         assert check(Path(path)) == []

@@ -22,10 +22,8 @@ from raptor.fitting import (
     deviations,
     distances,
     fit,
+    fit_joint,
     infer,
-    joint_content,
-    joint_measure,
-    joint_residuals,
     measure_again,
     minimise,
     outline_measure,
@@ -166,14 +164,14 @@ def test_a_joint_fit_serves_all_tissues_alike():
     def other(parameters):
         return smooth(parameters) ** 2
 
-    measures = {"one": smooth, "two": other}
+    measures = [smooth, other]
     targets = {"one": Target(*smooth([TRUTH])[0]), "two": Target(None, other([TRUTH])[0, 1])}
-    measure, residuals = joint_measure(measures), joint_residuals(targets)
-    found = minimise(measure, residuals, starts=32, seed=0)
-    content = joint_content(found.parameters, found.measured, targets, found.rank, found.evaluations)
-    assert content["rss"] == pytest.approx(found.rss, abs=1e-12)
-    assert content["rss"] < 1e-8
-    assert set(content["tissues"]) == {"one", "two"}
+    found = fit_joint(targets, measures, measures, starts=32, seed=0, budget=9)
+    assert set(found["surrogate"]["tissues"]) == {"one", "two"}
+    assert found["surrogate"]["rss"] < 1e-8
+    assert found["simulator"]["rss"] < 1e-5
+    assert found["simulator"]["evaluations"] <= 9
+    assert fit_joint(targets, measures, measures, starts=32, seed=0, budget=0)["simulator"] is None
 
 
 def test_a_posterior_shows_the_valley():

@@ -1,13 +1,13 @@
 """Fitting cell and matrix parameters to tissues: least squares, posteriors, outlines (docs/fits.md)."""
 
+from raptor.fitting.bound import simulate_at_delta
 from raptor.fitting.further import Sampled, rank_measurements, simulate_draws
+from raptor.fitting.joint import fit_joint
 from raptor.fitting.least_squares import (
     Fit,
     Minimum,
     descend,
     fit,
-    joint_measure,
-    joint_residuals,
     minimise,
 )
 from raptor.fitting.measurements import CANDIDATES, seen
@@ -20,8 +20,9 @@ from raptor.fitting.outline import (
     read_outline,
 )
 from raptor.fitting.posterior import Posterior, Survey, infer, profile, summarise, survey
+from raptor.fitting.recovery import recover
 from raptor.fitting.simulator import Simulator, descend_by_simulation, measure_again
-from raptor.fitting.tables import joint_content, tabulate, tabulate_joint, write_fit
+from raptor.fitting.tables import tabulate, tabulate_joint, write_fit
 from raptor.fitting.targets import (
     PARAMETERS,
     Target,
@@ -47,10 +48,8 @@ __all__ = [
     "deviations",
     "distances",
     "fit",
+    "fit_joint",
     "infer",
-    "joint_content",
-    "joint_measure",
-    "joint_residuals",
     "measure_again",
     "minimise",
     "outline_measure",
@@ -59,7 +58,9 @@ __all__ = [
     "profile",
     "rank_measurements",
     "read_outline",
+    "recover",
     "seen",
+    "simulate_at_delta",
     "simulate_draws",
     "summarise",
     "surrogate_densities",

@@ -4,7 +4,7 @@ The residual sum of squares of area ratio and central width ratio is minimised (
 Three parameters and two numbers: the minimum is a valley, and the rank of the problem says so.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from raptor.parameters import CellParameters
 
 STEP = 0.02  # of a finite difference, over a bound's width: the area counts whole pixels
 REFINED = 4  # of the points that a search starts from
+MOST_STEPS = 30
 WITHIN = (1e-6, 1 - 1e-6)  # SciPy asks for a start within the bounds
 TOLERANCE = 1e-3  # of singular values: change of a ratio across the whole range of a parameter
 
@@ -159,7 +160,7 @@ def minimise(measure: Measure, residuals: Residuals, *, starts: int, seed: int) 
         )
     for start in np.argsort(costs)[:REFINED]:
         if np.isfinite(costs[start]):
-            _descend(memory, points[start], STEP, 30)
+            _descend(memory, points[start], STEP, 1e-8)
     return memory.best()
 
 
@@ -172,14 +173,17 @@ def descend(
     step: float,
     enough: float,
 ) -> Minimum:
-    """Go down from a point (3,) of the unit cube, by a model that is dear.
+    """Go down from a point (3,) of the unit cube, by a model that is dear and noisy.
+
+    Where the search ends before its budget does, it starts again from the valley's other side: at the best
+    point's delta, with spring constants mirrored in their ranges.
 
     Parameters
     ----------
     budget : int
         Evaluations at most, four for each step down.
     step : float
-        Of finite differences, over a bound's width.
+        Of finite differences, over a bound's width; a search ends at steps a tenth as long.
     enough : float
         Residual sum of squares below which the search ends.
 
@@ -192,7 +196,9 @@ def descend(
     start = np.clip(start, *WITHIN)
     if not np.isfinite(_cost(memory.residuals_at(start[None])[0])):
         raise RaptorError("nothing of what was measured can be measured where the search starts")
-    _descend(memory, start, step, budget)
+    if _descend(memory, start, step, step / 10):
+        best = memory.best().unit
+        _descend(memory, np.array([best[0], 1 - best[1], 1 - best[2]]), step, step / 10)
     return memory.best()
 
 
@@ -201,25 +207,11 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
     return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed))
 
 
-def joint_measure(measures: Mapping[str, Measure]) -> Measure:
-    """Area and width ratios of several tissues with common parameters, side by side, (n, 2 tissues)."""
-    return lambda parameters: np.concatenate([measure(parameters) for measure in measures.values()], axis=1)
+def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> bool:
+    """SciPy's trust region reflective method within the cube; what it sees stays in memory.
 
-
-def joint_residuals(targets: Mapping[str, Target]) -> Residuals:
-    """What a fit of several tissues makes small, from measures as `joint_measure` gives them."""
-    ordered = list(targets.values())
-
-    def residuals(measured: NDArray[np.float64]) -> NDArray[np.float64]:
-        parts = np.split(measured, len(ordered), axis=-1)
-        found = [target.residuals(part) for target, part in zip(ordered, parts, strict=True)]
-        return np.concatenate(found, axis=-1)
-
-    return residuals
-
-
-def _descend(memory: _Memory, start: NDArray[np.float64], step: float, steps: int) -> None:
-    """SciPy's trust region reflective method within the cube; what it sees stays in memory."""
+    Returns whether it ended by itself.
+    """
 
     def residuals(unit: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(memory.residuals_at(unit[None])[0])
@@ -234,10 +226,13 @@ def _descend(memory: _Memory, start: NDArray[np.float64], step: float, steps: in
             jacobian,
             bounds=(0, 1),
             x_scale=0.3,
-            max_nfev=steps,
+            xtol=tolerance,
+            ftol=tolerance,
+            max_nfev=MOST_STEPS,
         )
     except _Enough:
-        return
+        return False
+    return True
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:

@@ -80,7 +80,7 @@ def read_outline(path: Path) -> Outline:
         raise RaptorError(f"outline {path} is of one colour; paint the tissue dark on white")
     dark = grey <= threshold_otsu(grey)
     level = float(np.median(grey[dark]) + np.median(grey[~dark])) / 2  # half-way, where edges are soft
-    excess = np.asarray(level - grey if np.median(rim) > level else grey - level)
+    excess = level - grey if np.median(rim) > level else grey - level
     return Outline.along(_pieces(excess[::-1], f"outline {path}"))  # the first row of a picture is on top
 
 
@@ -107,8 +107,9 @@ def distances(outline: Outline, density: NDArray[np.floating], threshold: float)
     edge = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(tissue)])
     points = shapely.points(outline.points)
     shapely.prepare(edge)
-    apart = shapely.distance(points, edge.boundary)
-    return np.asarray(np.where(shapely.contains(edge, points), apart, -apart))
+    apart = np.asarray(shapely.distance(points, edge.boundary), dtype=np.float64)
+    inside = np.asarray(shapely.contains(edge, points), dtype=bool)
+    return np.where(inside, apart, -apart)
 
 
 def outline_measure(densities: Densities, outline: Outline, threshold: float) -> Measure:
@@ -119,7 +120,7 @@ def outline_measure(densities: Densities, outline: Outline, threshold: float) ->
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         found = [distances(outline, density, threshold) for density in densities(parameters)]
-        return np.array(found) / np.sqrt(len(outline.points))
+        return np.asarray(np.array(found) / np.sqrt(len(outline.points)))
 
     return measure
 

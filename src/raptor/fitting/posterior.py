@@ -1,8 +1,9 @@
 """What measurements say of the parameters: a posterior over the whole region, and profile likelihoods.
 
 The surrogate is evaluated at Sobol points that fill the region; between them what it says is interpolated
-(cubic radial functions), so that tens of thousands of further Sobol points cost nothing. Each is weighed by its
-likelihood: in three dimensions this is exact quadrature, with no chain that could miss an end of the valley.
+(cubic radial functions), so that tens of thousands of further Sobol points cost nothing. Each is weighed by
+its likelihood: in three dimensions this is plain quadrature, with no chain that could miss an end of the
+valley.
 
 The likelihood of a measured ratio m at predicted ratio p is normal with
 
@@ -171,7 +172,7 @@ def interpolate(
     at: NDArray[np.float64],
     smoothing: float = 1e-4,
 ) -> NDArray[np.float64]:
-    """Values (n, k), known at points (n, 3), at others (m, 3), by cubic radial functions; NaN columns stay so."""
+    """Values (n, k) at points (n, 3) interpolated to others (m, 3): (m, k); columns with NaN stay NaN."""
     known = np.isfinite(values).all(axis=0)
     answer = np.full((len(at), values.shape[1]), np.nan)
     if known.any():
@@ -222,6 +223,10 @@ def summarise(posterior: Posterior) -> dict[str, Any]:
             for part, direction in zip(left, directions, strict=True)
         ],
         "determined": int((left < 0.5).sum()),
+        "profiles": {
+            name: {"value": values.tolist(), "log_likelihood": heights.tolist()}
+            for name, (values, heights) in profiles.items()
+        },
     }
 
 

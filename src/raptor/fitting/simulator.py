@@ -5,7 +5,7 @@ A simulation's area ratio varies with its seed by about 0.003. Within a fit one 
 at the fitted point have seeds of their own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,9 +44,20 @@ class Simulator:
     pixels: int
     seed: int
 
+    @classmethod
+    def configured(cls, content: Mapping[str, Any]) -> "Simulator":
+        """From a configuration's block `model`, accuracy, pixels and seed."""
+        block = content["model"]
+        model = NetworkModel(block["layers"], tuple(block["shells"]), block["tension"])
+        return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
+
+    def seed_of(self, further: int) -> int:
+        """The so many-th further seed; 0: that of fits."""
+        return (self.seed + further) % 2**31
+
     def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Simulation:
-        """Simulate a tissue, with the seed or the so many-th further one."""
-        return simulate(mould, parameters, self.model, self.accuracy, (self.seed + further) % 2**31)
+        """Simulate a tissue, with the seed of fits or the so many-th further one."""
+        return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(further))
 
     def fields(self, simulation: Simulation) -> NDArray[np.float64]:
         """The eight fields (8, y, x) of a simulated tissue."""

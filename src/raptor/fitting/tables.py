@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -39,25 +38,6 @@ def tabulate_joint(joint: Mapping[str, Any], fits: Sequence[dict[str, Any]]) -> 
         simulator = joint["simulator"]
         rows.insert(1, {"fit": "joint, simulator", **simulator["parameters"], "rss": simulator["rss"]})
     return pd.DataFrame(rows)
-
-
-def joint_content(
-    parameters: Any, measured: np.ndarray, targets: Mapping[str, Target], rank: int, evaluations: int
-) -> dict[str, Any]:
-    """A joint fit as JSON holds it: common parameters, and each tissue's ratios and rss."""
-    parts = measured.reshape(len(targets), 2)
-    tissues = {
-        name: dict(zip(RATIOS, map(float, part), strict=True)) | {"rss": target.rss(part)}
-        for (name, target), part in zip(targets.items(), parts, strict=True)
-    }
-    total = sum(tissue["rss"] for tissue in tissues.values())
-    return {
-        "parameters": asdict(parameters),
-        "rss": total,
-        "rank": rank,
-        "evaluations": evaluations,
-        "tissues": tissues,
-    }
 
 
 def _row(content: Mapping[str, Any], simulator: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -124,7 +124,7 @@ class _Memory:
         steps = np.where(unit + step <= 1, step, -step)
         here, *moved = self.residuals_at(np.stack([unit, *(unit + np.diag(steps))]))
         columns = [(there - here) / width for there, width in zip(moved, steps, strict=True)]
-        self.jacobians[unit.tobytes()] = np.stack(columns, axis=1)
+        self.jacobians[unit.tobytes()] = np.nan_to_num(np.stack(columns, axis=1))
         return self.jacobians[unit.tobytes()]
 
     def best(self) -> Minimum:

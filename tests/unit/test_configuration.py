@@ -122,7 +122,7 @@ def test_a_tissue_without_ratios_is_simulated_and_not_fitted(root, monkeypatch):
     tenocyte = load_tissues(root / "config" / "tissues.yaml", ("tenocyte",))
     assert not tenocyte["tenocyte"].measured
     require_measured({}, tenocyte)
-    with pytest.raises(RaptorError, match="name it in fit.unmeasured"):
+    with pytest.raises(RaptorError, match=r"name it in fit\.unmeasured"):
         require_measured(tenocyte, {})
     measured = Tissue.model_validate({"description": "x", "mould": "y", "area_ratio": 0.5})
     with pytest.raises(RaptorError, match="has no paper"):

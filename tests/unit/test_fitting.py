@@ -115,6 +115,16 @@ def test_a_fit_finds_a_tissue_and_says_what_is_not_determined():
     fitted.parameters.require_sampled("fit")
 
 
+def test_a_finer_model_refines_what_a_coarse_one_starts():
+    def coarse(parameters):
+        return smooth(parameters) + 0.02
+
+    target = Target(*smooth([TRUTH])[0])
+    fitted = fit(coarse, target, starts=32, seed=0, fine=smooth)
+    assert fitted.rss < 1e-8
+    assert target.rss(smooth([fitted.parameters])[0]) < 1e-8
+
+
 def test_a_fit_without_area_uses_the_width_alone():
     fitted = fit(smooth, Target(None, 0.7), starts=32, seed=0)
     assert fitted.width_ratio == pytest.approx(0.7, abs=1e-3)
@@ -166,12 +176,13 @@ def test_a_joint_fit_serves_all_tissues_alike():
 
     measures = [smooth, other]
     targets = {"one": Target(*smooth([TRUTH])[0]), "two": Target(None, other([TRUTH])[0, 1])}
-    found = fit_joint(targets, measures, measures, starts=32, seed=0, budget=9)
+    found = fit_joint(targets, measures, measures, measures, starts=32, seed=0, budget=9)
     assert set(found["surrogate"]["tissues"]) == {"one", "two"}
     assert found["surrogate"]["rss"] < 1e-8
     assert found["simulator"]["rss"] < 1e-5
     assert found["simulator"]["evaluations"] <= 9
-    assert fit_joint(targets, measures, measures, starts=32, seed=0, budget=0)["simulator"] is None
+    alone = fit_joint(targets, measures, measures, measures, starts=32, seed=0, budget=0)
+    assert alone["simulator"] is None
 
 
 def test_a_posterior_shows_the_valley():

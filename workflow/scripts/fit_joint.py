@@ -19,9 +19,10 @@ with logged(snakemake.log[0]):
     moulds = [read_mould(Path(path)).scaled(params.mould_scale) for path in snakemake.input.moulds]
     surrogate = load(Path(snakemake.input.weights).parent)
     predicted = [surrogate_measure(surrogate, mould) for mould in moulds]
+    refined = [surrogate_measure(surrogate, mould, averaged=True) for mould in moulds]
     simulated = [simulator.measure(mould) for mould in moulds]
     searches = {"starts": params.starts, "seed": simulator.seed, "budget": params.simulations}
-    content = fit_joint(targets, predicted, simulated, **searches)
+    content = fit_joint(targets, predicted, refined, simulated, **searches)
     write_fit(Path(snakemake.output.fit), content)
     with atomic_path(Path(snakemake.output.table)) as path:
         tabulate_joint(content, fits).to_csv(path, index=False)

@@ -19,7 +19,8 @@ with logged(snakemake.log[0]):
     mould = read_mould(Path(snakemake.input.mould)).scaled(params.mould_scale)
     surrogate = load(Path(snakemake.input.weights).parent)
     target = Target(tissue["area_ratio"], tissue["width_ratio"])
-    fitted = fit(surrogate_measure(surrogate, mould), target, starts=params.starts, seed=simulator.seed)
+    start, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
+    fitted = fit(start, target, starts=params.starts, seed=simulator.seed, fine=fine)
     runs = [simulator.run(mould, fitted.parameters, further) for further in range(1, params.repeats + 1)]
     first = Run(0, mould.name, "test", False, fitted.parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)

@@ -124,11 +124,17 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
         raise RaptorError("a fit needs a surrogate, or parameters from which the simulator starts")
     start = None if request.start is None else unit_of(request.start)
     if request.surrogate is not None:
-        densities = surrogate_densities(request.surrogate, request.mould)
-        measure, residuals = request.measure(densities, surrogate_measure(request.surrogate, request.mould))
-        found = minimise(measure, residuals, starts=STARTS, seed=request.simulator.seed)
+        (start_by, residuals), (measure, _) = (
+            request.measure(
+                surrogate_densities(request.surrogate, request.mould, averaged=averaged),
+                surrogate_measure(request.surrogate, request.mould, averaged=averaged),
+            )
+            for averaged in (False, True)
+        )
+        seed = request.simulator.seed
+        found = minimise(start_by, residuals, starts=STARTS, seed=seed, fine=measure)
         if not request.by_simulator:
-            return found, measure, densities
+            return found, measure, surrogate_densities(request.surrogate, request.mould, averaged=True)
         start = found.unit
     assert start is not None
     measure, residuals = request.measure(request.simulated, request.simulator.measure(request.mould))

@@ -16,6 +16,7 @@ from raptor.parameters import CellParameters
 def fit_joint(
     targets: Mapping[str, Target],
     predicted: Sequence[Measure],
+    refined: Sequence[Measure],
     simulated: Sequence[Measure],
     *,
     starts: int,
@@ -26,13 +27,14 @@ def fit_joint(
 
     Parameters
     ----------
-    predicted, simulated : sequence of Measure
-        Of each tissue, in the order of the targets.
+    predicted, refined, simulated : sequence of Measure
+        Of each tissue, in the order of the targets: by the surrogate to start from, to refine by, simulated.
     budget : int
         Points at which all tissues may be simulated; 0: no fit by the simulator.
     """
     residuals = joint_residuals(list(targets.values()))
-    found = minimise(joint_measure(predicted), residuals, starts=starts, seed=seed)
+    fine = joint_measure(refined)
+    found = minimise(joint_measure(predicted), residuals, starts=starts, seed=seed, fine=fine)
     content: dict[str, Any] = {
         "targets": {name: asdict(target) for name, target in targets.items()},
         "surrogate": _content(found, targets),

@@ -5,7 +5,7 @@ Three parameters and two numbers: the minimum is a valley, and the rank of the p
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,11 +136,15 @@ class _Memory:
         return Minimum(self.points[key], self.measured[key], costs[key], rank, len(self))
 
 
-def minimise(measure: Measure, residuals: Residuals, *, starts: int, seed: int) -> Minimum:
+def minimise(
+    measure: Measure, residuals: Residuals, *, starts: int, seed: int, fine: Measure | None = None
+) -> Minimum:
     """Search the whole region, by a model that is cheap: from the best of many points that fill it.
 
     Parameters
     ----------
+    fine : Measure, optional
+        A better model, which refines what `measure` started; without it `measure` does.
     starts : int
         Points of a Sobol sequence at which the model is evaluated first (a power of two); the best four are
         refined.
@@ -158,10 +162,13 @@ def minimise(measure: Measure, residuals: Residuals, *, starts: int, seed: int) 
             "nothing of what was measured can be measured on this mould: a tether may fill its central "
             "section; give the area ratio alone, or another mould"
         )
+    if fine is not None:
+        memory = _Memory(fine, residuals, 10**9, 0.0)
     for start in np.argsort(costs)[:REFINED]:
-        if np.isfinite(costs[start]):
+        if np.isfinite(costs[start]) and np.isfinite(_cost(memory.residuals_at(points[start][None])[0])):
             _descend(memory, points[start], STEP, 1e-8)
-    return memory.best()
+    best = memory.best()
+    return best if fine is None else replace(best, evaluations=best.evaluations + starts)
 
 
 def descend(
@@ -202,9 +209,9 @@ def descend(
     return memory.best()
 
 
-def fit(measure: Measure, target: Target, *, starts: int, seed: int) -> Fit:
+def fit(measure: Measure, target: Target, *, starts: int, seed: int, fine: Measure | None = None) -> Fit:
     """Fit the parameters to one tissue, as `minimise`."""
-    return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed))
+    return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed, fine=fine))
 
 
 def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> bool:

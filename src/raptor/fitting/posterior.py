@@ -109,7 +109,7 @@ class Posterior:
 def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey:
     """Ask the surrogate about a mould's tissue at points (a power of two) that fill the region.
 
-    Predictions are of one image, for speed; bands are those of the mean over the images of D4, and stand at
+    Predictions are means over the images of D4, as those that bands were calibrated on; bands are found at
     the first 32 points.
 
     Raises
@@ -125,7 +125,7 @@ def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey
     values = []
     for start in range(0, points, TOGETHER):
         part = parameters[start : start + TOGETHER]
-        fields = surrogate.predict(image.depression, image.tethers, part, cells, averaged=False)
+        fields = surrogate.predict(image.depression, image.tethers, part, cells)
         values += [seen(each, mould, surrogate.threshold) for each in fields]
     return Survey(units, np.array(values), np.array(bands, dtype=float) / norm.ppf(0.975))
 

@@ -38,14 +38,19 @@ def recover(
 
     `error` of each is the root mean square error over parameters and searches, in parts of their ranges.
     """
-    measure = surrogate_measure(surrogate, mould)
+    measure, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
     target = Target(*shape_ratios(density, mould, surrogate.layers))
     threshold = density_threshold(surrogate.layers, density.shape[-1])
     outline = outline_of(density, threshold)
-    apart = outline_measure(surrogate_densities(surrogate, mould), outline, surrogate.threshold)
+    coarse, apart = (
+        outline_measure(
+            surrogate_densities(surrogate, mould, averaged=averaged), outline, surrogate.threshold
+        )
+        for averaged in (False, True)
+    )
     seeds = [seed + number for number in range(1, SEARCHES + 1)]
-    by_ratios = [minimise(measure, target.residuals, starts=starts, seed=each) for each in seeds]
-    by_outline = [minimise(apart, lambda measured: measured, starts=starts, seed=each) for each in seeds]
+    by_ratios = [minimise(measure, target.residuals, starts=starts, seed=each, fine=fine) for each in seeds]
+    by_outline = [minimise(coarse, np.asarray, starts=starts, seed=each, fine=apart) for each in seeds]
     best = min(by_outline, key=lambda found: found.rss)
     errors = deviations(apart, best, outline, ERROR)
     return {

@@ -88,11 +88,11 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([strip.upper - strip.lower for strip in strips])
 
 
-def surrogate_measure(surrogate: Surrogate, mould: Mould) -> Measure:
-    """Area and width ratio of a mould's tissue as the surrogate predicts them, from one image for speed."""
+def surrogate_measure(surrogate: Surrogate, mould: Mould, *, averaged: bool = False) -> Measure:
+    """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
     image = mould_image(mould, surrogate.pixels)
     threshold = density_threshold(surrogate.layers, surrogate.pixels)
-    densities_of = surrogate_densities(surrogate, mould)
+    densities_of = surrogate_densities(surrogate, mould, averaged=averaged)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         return np.array(
@@ -105,13 +105,16 @@ def surrogate_measure(surrogate: Surrogate, mould: Mould) -> Measure:
     return measure
 
 
-def surrogate_densities(surrogate: Surrogate, mould: Mould) -> Callable[[Sequence[CellParameters]], Any]:
+def surrogate_densities(
+    surrogate: Surrogate, mould: Mould, *, averaged: bool = False
+) -> Callable[[Sequence[CellParameters]], Any]:
     """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate."""
     cells = len(cast_sites(mould, surrogate.layers))
     image = mould_image(mould, surrogate.pixels)
 
     def densities(parameters: Sequence[CellParameters]) -> NDArray[np.float32]:
-        return surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=False)[:, 0]
+        fields = surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=averaged)
+        return fields[:, 0]
 
     return densities
 

@@ -34,9 +34,10 @@ def test_the_run_ends_with_the_report(results):
         "tradeoff.png",
         "design.png",
         "fit_glial_1.png",
+        "valley_glial_1.png",
     ):
         assert name in text
-    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv"):
+    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv", "joint.csv"):
         assert name in text
 
 
@@ -106,6 +107,22 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert shipped.keys() == weights.keys()
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
+    assert fit["simulation"]["runs"] == 2
+    by_simulator = json.loads((results / "fits" / "glial_1_simulator.json").read_text())
+    assert by_simulator["fit"]["evaluations"] <= 5
+    posterior = json.loads((results / "fits" / "glial_1_posterior.json").read_text())
+    for parameter in posterior["parameters"].values():
+        assert parameter["quantiles"]["0.025"] <= parameter["mean"] <= parameter["quantiles"]["0.975"]
+    assert len(pd.read_csv(results / "fits" / "glial_1_draws.csv")) == 5
+    further = pd.read_csv(results / "fits" / "glial_1_further.csv")
+    assert {"outline", "alignment", "tension", "thickness"} <= set(further["measurement"])
+    joint = pd.read_csv(results / "fits" / "joint.csv").set_index("fit")
+    assert {"joint", "joint, simulator", "separate, mean", "paper, mean"} <= set(joint.index)
+    outline = json.loads((results / "fits" / "glial_1_outline.json").read_text())
+    assert outline["outline"]["distance"] >= 0
+    table = pd.read_csv(results / "fits" / "fits.csv").set_index("tissue")
+    assert (table[["surrogate_again_rss", "simulator_again_rss", "paper_simulation_rss"]] >= 0).all(axis=None)
+    assert len(pd.read_csv(results / "fits" / "myoblast_bound.csv")) == 5
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
     others = ["draft", "anneal-20", "1 layers", "shells 1 2 4", "16 pixels", "surrogate"]
     assert tradeoff["method"].tolist() == [f"reference, seed {n}" for n in range(1, 5)] + others
@@ -119,7 +136,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
 def test_every_figure_has_its_data(results):
     for figure in (
         "design", "fields", "bulk", "training", "calibration", "regions", "worst", "models", "tradeoff",
-        "folding", "fit_glial_1",
+        "folding", "fit_glial_1", "valley_glial_1",
     ):  # fmt: skip
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made

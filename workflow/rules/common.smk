@@ -19,6 +19,10 @@ try:
     TISSUES = configuration.load_tissues(
         Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
     )
+    UNMEASURED = configuration.load_tissues(
+        Path(CONFIG.fit.tissues_file), CONFIG.fit.unmeasured, CONFIG.fit.mould_scale
+    )
+    configuration.require_measured(TISSUES, UNMEASURED)
     configuration.require_castable(CONFIG.tradeoff.cases)
 except RaptorError as error:
     raise WorkflowError(str(error))
@@ -45,6 +49,7 @@ FIGURES = (
 wildcard_constraints:
     shard=r"\d+-\d+",
     tissue="|".join(CONFIG.fit.tissues),
+    unmeasured="|".join(CONFIG.fit.unmeasured) or "none",
     figure="|".join(FIGURES),
     case="|".join(CASES),
     model="|".join([*MODELS, *BASELINES]),

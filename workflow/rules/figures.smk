@@ -224,3 +224,4 @@ rule figures:
     input:
         expand(f"{RESULTS}/figures/{{figure}}.png", figure=FIGURES),
         expand(rules.plot_fit.output.png, tissue=CONFIG.fit.tissues),
+        expand(rules.plot_valley.output.png, tissue=CONFIG.fit.tissues),

@@ -1,7 +1,7 @@
 """The typed configuration: blocks, the whole, its reading, measured tissues."""
 
 from raptor.configuration.reading import load, parse, require_castable
-from raptor.configuration.tissues import Tissue, load_tissue, load_tissues
+from raptor.configuration.tissues import Tissue, load_tissue, load_tissues, require_measured
 from raptor.configuration.whole import Configuration, content_hash
 
 __all__ = [
@@ -13,4 +13,5 @@ __all__ = [
     "load_tissues",
     "parse",
     "require_castable",
+    "require_measured",
 ]

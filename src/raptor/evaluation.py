@@ -230,6 +230,16 @@ def by_region(metrics: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def regions_of(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Errors by region on the test split, then on each further set, of one model's tables by set."""
+    further = [
+        by_region(table).head(1).assign(region=f"further: {name}")
+        for name, table in tables.items()
+        if name != "test"
+    ]
+    return pd.concat([by_region(tables["test"]), *further], ignore_index=True)
+
+
 def worst(metrics: pd.DataFrame, count: int = 12) -> pd.DataFrame:
     """The samples with the largest error of density, worst first."""
     return metrics.sort_values("vrmse_density", ascending=False).head(count)

@@ -1,4 +1,9 @@
-"""Area and width of a tissue, from its density (paper, "Model parameters and predictive capability")."""
+"""Area and width of a tissue (paper, "Model parameters and predictive capability").
+
+From its density, as simulated or predicted, or from its outline, as measured.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -40,29 +45,48 @@ def central_section(mould: Mould) -> shapely.LineString:
 
     Where the two sides are equal, the one nearer to x counts as the long one.
     """
+    return sections(mould, (0.0,))[0]
+
+
+def sections(mould: Mould, places: Sequence[float]) -> list[shapely.LineString]:
+    """Lines parallel to the central section, at places from -1 to 1 along half of the long side."""
+    centre, half = long_axis(mould)
+    across = np.array([-half[1], half[0]]) / np.hypot(*half)
+    reach = IMAGE_SIZE * across
+    middles = [centre + place * half for place in places]
+    return [shapely.LineString([middle - reach, middle + reach]) for middle in middles]
+
+
+def long_axis(mould: Mould) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre of the depression's minimum rotated rectangle, and half of its long side, each (2,), l0."""
     rectangle = shapely.oriented_envelope(mould.outline)
     corners = shapely.get_coordinates(rectangle)[:4]
-    centre = corners.mean(axis=0)
     sides = corners[1:3] - corners[:2]
     lengths = np.linalg.norm(sides, axis=1)
     if np.isclose(lengths[0], lengths[1], rtol=1e-6):
         long = int(np.abs(sides[1, 0]) > np.abs(sides[0, 0]))
     else:
         long = int(lengths[1] > lengths[0])
-    across = np.array([-sides[long, 1], sides[long, 0]]) / lengths[long]
-    reach = IMAGE_SIZE * across
-    return shapely.LineString([centre - reach, centre + reach])
+    return corners.mean(axis=0), sides[long] / 2
 
 
 def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -> float:
-    """w/w0: length of tissue on the central section over length of depression; NaN without any.
+    """w/w0: length of tissue on the central section over length of depression; NaN without any."""
+    return section_ratio(density, mould, threshold, [central_section(mould)])
 
-    The ends of the tissue are found by linear interpolation of the density between samples.
+
+def section_ratio(
+    density: NDArray[np.floating], mould: Mould, threshold: float, lines: Sequence[shapely.LineString]
+) -> float:
+    """Length of tissue on sections through the image over length of depression; NaN without any.
+
+    The ends of the tissue are found by linear interpolation of the density (y, x) between samples.
     """
-    section = central_section(mould)
-    cast = float(section.intersection(mould.depression).length)
-    if cast < 1e-9:
-        return float("nan")
+    return sum(_tissue_length(density, line, threshold) for line in lines) / _cast_width(lines, mould)
+
+
+def _tissue_length(density: NDArray[np.floating], section: shapely.LineString, threshold: float) -> float:
+    """Length of tissue on a section, l0."""
     pixels = density.shape[-1]
     step = pixel_size(pixels) / SAMPLES_PER_PIXEL
     # The centre is a sample, so that a mould and its mirror image are sampled alike.
@@ -74,7 +98,20 @@ def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -
     middle = (pixels - 1) / 2
     rows, columns = (middle + c / pixel_size(pixels) for c in (y, x))
     values = map_coordinates(density, [rows, columns], order=1, mode="constant", cval=0.0)
-    return float(_length_above(values - threshold) * step / cast)
+    return _length_above(values - threshold) * step
+
+
+def outline_ratios(tissue: shapely.Geometry, mould: Mould) -> tuple[float, float]:
+    """A/A0 and w/w0 of a tissue given by its outline, l0; w/w0 is NaN where `width_ratio` is."""
+    section = central_section(mould)
+    width = float(section.intersection(tissue).length)
+    return float(tissue.area / mould.depression.area), width / _cast_width([section], mould)
+
+
+def _cast_width(lines: Sequence[shapely.LineString], mould: Mould) -> float:
+    """Length of depression on sections, l0; NaN without any."""
+    length = sum(float(line.intersection(mould.depression).length) for line in lines)
+    return length if length >= 1e-9 else float("nan")
 
 
 def _length_above(excess: NDArray[np.floating]) -> float:

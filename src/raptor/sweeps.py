@@ -194,6 +194,6 @@ def tissues(
             found[point] = Tissue(point, simulated, predicted)
     if not found:
         raise RaptorError(
-            f"every simulation of {mould.name} that is to be drawn failed; see the logs of simulate_sweep for why"
+            f"every simulation of {mould.name} to be drawn failed; see the logs of simulate_sweep for why"
         )
     return [found[point] for point in points if point in found]

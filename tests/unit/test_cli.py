@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 
 from raptor.cli import COMMANDS
 from raptor.condor.lattice import cast_sites
@@ -177,6 +178,88 @@ def test_a_failed_writer_leaves_what_was_there(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def untrained(folder):
+    """A calibrated surrogate that has learnt nothing."""
+    from raptor.dataset.scaling import Scaling
+    from raptor.surrogate.calibration import Calibration, Scale
+    from raptor.surrogate.files import save
+    from raptor.surrogate.networks import Architecture, Generator, initialise
+    from raptor.surrogate.novelty import DESCRIPTORS, Novelty
+
+    architecture, scaling = Architecture(32, 4), Scaling((0.5,) * 8, (0.5,) * 8)
+    weights = [initialise(Generator(architecture, scaling)).state_dict() for _ in range(2)]
+    scales = [Scale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 2)]
+    novelty = Novelty(np.random.default_rng(0).normal(size=(9, len(DESCRIPTORS))).astype(np.float32), 1e-3)
+    save(folder, weights, architecture, scaling, 4, 32, {}, "x", Calibration(*scales, 0.1, novelty))
+    return folder
+
+
+def test_fit_by_a_surrogate_gives_intervals(tmp_path):
+    output, picture = tmp_path / "fit.json", tmp_path / "fit.png"
+    done = raptor(
+        "fit", MOULD, "--tissue", "glial_1", "--tissues", TISSUES, "--model", untrained(tmp_path),
+        "--output", output, "--picture", picture, "--json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    numbers, content = json.loads(done.stdout), json.loads(output.read_text())
+    assert numbers["delta_lower"] <= numbers["delta_upper"]
+    assert numbers["rss"] == pytest.approx(content["fit"]["rss"])
+    assert content["target"] == {"area_ratio": 0.81404, "width_ratio": 0.7972}
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("what", ["ratios", "outline"])
+def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
+    """The tissue that is fitted is one of the simulator's own, a little off the start."""
+    from raptor.condor import simulate
+    from raptor.fields import rasterise
+    from raptor.morphology import density_threshold, shape_ratios
+    from raptor.parameters import CellParameters, NetworkModel
+
+    mould = read_mould(Path(MOULD))
+    made = simulate(mould, CellParameters(0.35, 0.5, 0.3), NetworkModel(1), "draft", 3)
+    density = rasterise(made.positions, made.orientation, made.tension, 256)[0]
+    if what == "ratios":
+        area, width = shape_ratios(density, mould, 1)
+        target = ("--area-ratio", area, "--width-ratio", width)
+    else:
+        tissue = density < density_threshold(1, 256)
+        Image.fromarray((255 * tissue[::-1]).astype(np.uint8)).save(tmp_path / "tissue.png")
+        target = ("--outline", tmp_path / "tissue.png")
+    output = tmp_path / "fit.json"
+    done = raptor(
+        "fit", MOULD, *target, "--by", "simulator", *options(delta=0.3), "--layers", 1, "--accuracy", "draft",
+        "--simulations", 10, "--output", output,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(output.read_text())["fit"]
+    assert found["evaluations"] <= 10
+    assert found["parameters"]["delta"] == pytest.approx(0.35, abs=0.04)
+    assert found["rss"] < (1e-3 if what == "ratios" else 0.3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "give what was measured in one way"),
+        (("--tissue", "glial_1", "--area-ratio", 0.5), "give what was measured in one way"),
+        (("--tissue", "tenocyte", "--tissues", TISSUES), "has no measured ratio to fit"),
+        (("--area-ratio", 2), "a ratio to the mould's lies between 0 and 1.5"),
+        (("--area-ratio", 0.5, *options()), "give --by simulator too"),
+        (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
+        (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
+        (("--outline", MOULD), "is no picture, or is cut short"),
+        (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is no picture's name"),
+    ],
+)
+def test_bad_input_to_fit(arguments, message, tmp_path):
+    done = raptor("fit", MOULD, *arguments, "--output", tmp_path / "x.json")
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_predict_writes_fields_that_check_takes(tmp_path):
     from raptor.dataset.scaling import Scaling
     from raptor.surrogate.calibration import Calibration, Scale
@@ -201,9 +284,31 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     assert "unlike the training set" in done.stdout
     with xr.open_dataset(output) as prediction:
         assert prediction["fields"].dims == ("sample", "field", "y", "x")
-        assert prediction["fields_band"].dims == ("sample", "level", "field", "y", "x")
+        assert prediction["fields_std"].dims == prediction["fields"].dims
+        assert (prediction["fields_std"] > 0).all()
         assert float(prediction["delta"][0]) == 0.5
         assert float(prediction["area_ratio_band"][0, 2]) >= 0.3
+    assert raptor("check", output).returncode == 0
+
+
+def test_the_shipped_model_predicts_without_training(tmp_path):
+    from raptor.surrogate.files import SHIPPED
+
+    size = sum(path.stat().st_size for path in SHIPPED.iterdir())
+    assert size < 20e6
+    output, picture = tmp_path / "prediction.nc", tmp_path / "prediction.png"
+    mould = ROOT / "config" / "moulds" / "four_post_rectangle.geojson"
+    done = raptor(
+        "predict", mould, *options(), "--output", output, "--picture", picture, "--json"
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert 0 < found["width_ratio"] < 1
+    assert 0 < found["area_ratio"] < 1
+    assert found["area_ratio_band95"] > 0
+    assert picture.stat().st_size > 10_000
+    with xr.open_dataset(output) as prediction:
+        assert dict(prediction.sizes)["x"] == 256
     assert raptor("check", output).returncode == 0
 
 

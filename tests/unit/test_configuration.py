@@ -5,7 +5,7 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from raptor.configuration import Configuration, Tissue, load, load_tissues
+from raptor.configuration import Configuration, Tissue, load, load_tissues, require_measured
 from raptor.errors import RaptorError
 from raptor.reference import key_table, write_reference
 
@@ -115,6 +115,30 @@ def test_a_bad_configuration_is_named(tmp_path, text, message):
 def test_a_tissue_needs_a_measurement():
     with pytest.raises(ValueError, match="neither area_ratio nor width_ratio"):
         Tissue.model_validate({"description": "x", "mould": "y"})
+
+
+def test_a_tissue_without_ratios_is_simulated_and_not_fitted(root, monkeypatch):
+    monkeypatch.chdir(root)
+    tenocyte = load_tissues(root / "config" / "tissues.yaml", ("tenocyte",))
+    assert not tenocyte["tenocyte"].measured
+    require_measured({}, tenocyte)
+    with pytest.raises(RaptorError, match=r"name it in fit\.unmeasured"):
+        require_measured(tenocyte, {})
+    measured = Tissue.model_validate({"description": "x", "mould": "y", "area_ratio": 0.5})
+    with pytest.raises(RaptorError, match="has no paper"):
+        require_measured({}, {"x": measured})
+
+
+@pytest.mark.parametrize(
+    ("fit", "message"),
+    [
+        ({"joint": ["glial_2", "glial_1"]}, "joint has 'glial_2', which is not in tissues"),
+        ({"joint": ["glial_1"]}, "two tissues or more"),
+    ],
+)
+def test_a_joint_fit_needs_tissues_that_are_fitted(fit, message):
+    with pytest.raises(ValidationError, match=message):
+        Configuration.model_validate({"fit": fit})
 
 
 def test_a_gpu_is_not_made_up(monkeypatch):

@@ -10,9 +10,8 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
 from raptor.errors import RaptorError
-from raptor.fitting import Target, fit, parameters_at
 from raptor.moulds import Mould, mould_image
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.parameters import CellParameters
 from raptor.surrogate.feeding import Feeder
 from raptor.surrogate.files import load, save
 from raptor.surrogate.losses import discriminator_loss, generator_loss, relative_distance
@@ -204,64 +203,3 @@ def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
     (model_folder / "model.json").write_text("{}")
     with pytest.raises(RaptorError, match=r"model.json cannot be read"):
         load(model_folder)
-
-
-def test_the_unit_cube_is_the_papers_region():
-    for unit in np.random.default_rng(0).random((200, 3)):
-        parameters_at(unit).require_sampled("fit")
-    low, high = parameters_at(np.zeros(3)), parameters_at(np.ones(3))
-    assert (low.delta, low.kappa_nnn, low.kappa_nnnn) == (
-        DELTA.lower,
-        KAPPA_NNN.lower,
-        KAPPA_NNNN.lower,
-    )
-    assert (high.delta, high.kappa_nnn, high.kappa_nnnn) == (
-        DELTA.upper,
-        KAPPA_NNN.upper,
-        KAPPA_NNNN.upper,
-    )
-
-
-def smooth(parameters):
-    """A stand-in for a tissue: both ratios fall with delta, each with a stiffness of its own."""
-    return np.array(
-        [
-            (
-                1 - 0.6 * p.delta * (1 - 0.5 * p.kappa_nnn),
-                1 - 0.8 * p.delta * (1 - 0.3 * p.kappa_nnnn),
-            )
-            for p in parameters
-        ]
-    )
-
-
-def test_a_fit_finds_a_tissue_and_says_what_is_not_determined():
-    truth = CellParameters(0.6, 0.4, 0.2)
-    area, width = smooth([truth])[0]
-    fitted = fit(smooth, Target(area, width), starts=32, seed=0)
-    assert fitted.rss < 1e-8
-    assert (fitted.area_ratio, fitted.width_ratio) == pytest.approx((area, width), abs=1e-3)
-    assert fitted.rank == 2  # two numbers, three parameters
-    fitted.parameters.require_sampled("fit")
-
-
-def test_a_fit_without_area_uses_the_width_alone():
-    fitted = fit(smooth, Target(None, 0.7), starts=32, seed=0)
-    assert fitted.width_ratio == pytest.approx(0.7, abs=1e-3)
-    assert fitted.rank == 1
-
-
-def test_a_fit_leaves_a_flat_corner():
-    """Near a lower bound steps keep their size: pixels count, so tiny steps would see nothing."""
-
-    def stepped(parameters):
-        return np.round(smooth(parameters), 2)
-
-    truth = CellParameters(0.6, 0.4, 0.2)
-    area, width = smooth([truth])[0]
-    assert fit(stepped, Target(area, width), starts=32, seed=0).rss < 2e-4
-
-
-def test_a_fit_of_nothing_measurable_is_named():
-    with pytest.raises(RaptorError, match="nothing of what was measured"):
-        fit(lambda parameters: np.full((len(parameters), 2), np.nan), Target(None, 0.5), starts=16, seed=0)

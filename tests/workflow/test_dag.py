@@ -15,7 +15,8 @@ EVERYTHING = {
     "design_further", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
     "evaluate_baseline", "compare_models", "summarise_evaluation", "plot_calibration", "plot_regions",
     "plot_worst", "plot_models", "ship",
-    "fit_tissue", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
+    "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "simulate_unmeasured",
+    "plot_valley", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
     "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",
     "design_sweep", "simulate_sweep", "measure_sweep", "predict_sweep", "compare_sweep", "plot_contraction",
     "plot_panels", "plot_directors", "write_report",
@@ -52,8 +53,10 @@ def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
     path = tmp_path / "tissues.yaml"
     path.write_text(yaml.safe_dump(tissues))
     jobs = place.jobs(configuration=variant(tmp_path, fit__tissues_file=str(path)))
-    fitted = {"fit_tissue", "tabulate_fits", "plot_fit"}
-    assert jobs == fitted | {"record_configuration", "write_report", "report", "all"}
+    assert jobs == {
+        "record_configuration", "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint",
+        "fit_outline", "tabulate_fits", "plot_fit", "plot_valley", "write_report", "report", "all",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -66,6 +69,8 @@ def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
         ({"fields__pixels": 64}, {"sample_design", "simulate_shard"}),
         ({"sweep__seeds": 2}, {"simulate_shard", "train_member", "fit_tissue", "measure_tradeoff"}),
         ({"tradeoff__seeds": 5}, {"simulate_shard", "train_member", "fit_tissue", "plot_fit"}),
+        ({"fit__error": 0.02}, {"simulate_shard", "train_member", "fit_tissue", "fit_by_simulator"}),
+        ({"fit__simulations": 6}, {"train_member", "fit_tissue", "infer_parameters", "fit_outline"}),
         ({"simulation__accuracy": "standard"}, {"sample_design", "compile_kernels", "plot_design"}),
         ({"seed": 1}, {"compile_kernels"}),
     ],
@@ -82,8 +87,9 @@ def test_targets_make_their_part(workplace):
     assert "train_member" not in place.jobs("dataset")
     assert "evaluate_model" not in place.jobs("train")
     assert {"evaluate_model", "train_member"} <= place.jobs("evaluate")
-    assert {"fit_tissue", "plot_fit"} <= place.jobs("fit")
     assert {"simulate_sweep", "plot_contraction", "plot_panels", "plot_directors"} <= place.jobs("sweep")
+    fits = {"fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "plot_valley"}
+    assert fits <= place.jobs("fit")
     assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
     assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
     assert place.jobs("report") == EVERYTHING - {"all"}

@@ -38,9 +38,10 @@ def test_the_run_ends_with_the_report(results):
         "contraction.png",
         "panels_i_shape.png",
         "directors.png",
+        "valley_glial_1.png",
     ):
         assert name in text
-    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv"):
+    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv", "joint.csv"):
         assert name in text
 
 
@@ -87,7 +88,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     history = pd.read_csv(results / "surrogate" / "compact" / "training.csv")
     assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
-    metrics = json.loads((results / "evaluation" / "metrics.json").read_text())
+    metrics = json.loads((results / "evaluation" / "compact" / "metrics.json").read_text())
     assert set(metrics) == {"test", "corner"}
     assert metrics["test"]["samples"] == 2
     assert set(metrics["test"]["bulk"]) == {
@@ -101,7 +102,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert models.index.tolist() == ["compact", "pix2pix", "nearest", "mean"]
     assert (models.loc[["compact", "pix2pix"], "training_core_minutes"] > 0).all()
     assert models["density_in_floors"].notna().all()
-    regions = pd.read_csv(results / "evaluation" / "regions.csv").set_index("region")
+    regions = pd.read_csv(results / "evaluation" / "compact" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
     assert regions.loc["further: corner", "samples"] == 2
     card = (results / "shipped" / "card.md").read_text()
@@ -111,6 +112,22 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert shipped.keys() == weights.keys()
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
+    assert fit["simulation"]["runs"] == 2
+    by_simulator = json.loads((results / "fits" / "glial_1_simulator.json").read_text())
+    assert by_simulator["fit"]["evaluations"] <= 5
+    posterior = json.loads((results / "fits" / "glial_1_posterior.json").read_text())
+    for parameter in posterior["parameters"].values():
+        assert parameter["quantiles"]["0.025"] <= parameter["mean"] <= parameter["quantiles"]["0.975"]
+    assert len(pd.read_csv(results / "fits" / "glial_1_draws.csv")) == 5
+    further = pd.read_csv(results / "fits" / "glial_1_further.csv")
+    assert {"outline", "alignment", "tension", "thickness"} <= set(further["measurement"])
+    joint = pd.read_csv(results / "fits" / "joint.csv").set_index("fit")
+    assert {"joint", "joint, simulator", "separate, mean", "paper, mean"} <= set(joint.index)
+    outline = json.loads((results / "fits" / "glial_1_outline.json").read_text())
+    assert outline["outline"]["distance"] >= 0
+    table = pd.read_csv(results / "fits" / "fits.csv").set_index("tissue")
+    assert (table[["surrogate_again_rss", "simulator_again_rss", "paper_simulation_rss"]] >= 0).all(axis=None)
+    assert len(pd.read_csv(results / "fits" / "myoblast_bound.csv")) == 5
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
     others = ["draft", "anneal-20", "1 layers", "shells 1 2 4", "16 pixels", "surrogate"]
     assert tradeoff["method"].tolist() == [f"reference, seed {n}" for n in range(1, 5)] + others
@@ -142,7 +159,8 @@ def test_sweeps_are_simulated_and_predicted_at_every_point(results):
 def test_every_figure_has_its_data(results):
     for figure in (
         "design", "fields", "bulk", "training", "calibration", "regions", "worst", "models", "tradeoff",
-        "folding", "fit_glial_1", "contraction", "panels_four_post_rectangle", "panels_i_shape", "directors",
+        "folding", "fit_glial_1", "valley_glial_1", "contraction", "panels_four_post_rectangle",
+        "panels_i_shape", "directors",
     ):  # fmt: skip
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made

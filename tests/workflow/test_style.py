@@ -56,7 +56,7 @@ LAYERS = (
     ("fields", "fields_batch", "metrics", "orientation", "resolution"), ("dataset",),
     ("surrogate", "baselines"),
     ("fitting", "enrichment", "evaluation", "sweeps", "tradeoff", "configuration", "plotting"),
-    ("reference", "model_card", "report"), ("cli", "benchmark"),
+    ("reference", "model_card", "measuring", "report"), ("cli", "benchmark"),
 )  # fmt: skip
 HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
 

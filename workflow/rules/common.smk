@@ -19,6 +19,10 @@ try:
     TISSUES = configuration.load_tissues(
         Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
     )
+    UNMEASURED = configuration.load_tissues(
+        Path(CONFIG.fit.tissues_file), CONFIG.fit.unmeasured, CONFIG.fit.mould_scale
+    )
+    configuration.require_measured(TISSUES, UNMEASURED)
     configuration.require_castable(CONFIG.tradeoff.cases, CONFIG.sweep)
 except RaptorError as error:
     raise WorkflowError(str(error))
@@ -29,6 +33,7 @@ CASES = {case.name: case for case in CONFIG.tradeoff.cases}
 MODELS = CONFIG.models
 SETS = CONFIG.further_sets
 SWEEPS = CONFIG.sweep.files()
+JUDGED = ["test", *(name for name in ("bars", "slender", "corner") if name in SETS)]
 FIGURES = (
     "design",
     "fields",
@@ -45,6 +50,7 @@ FIGURES = (
 wildcard_constraints:
     shard=r"\d+-\d+",
     tissue="|".join(CONFIG.fit.tissues),
+    unmeasured="|".join(CONFIG.fit.unmeasured) or "none",
     figure="|".join(FIGURES),
     case="|".join(CASES),
     model="|".join([*MODELS, *BASELINES]),

@@ -7,21 +7,23 @@ rule evaluate_model:
         stack=lambda wildcards: (
             rules.build_stack.output.stack
             if wildcards.set == "test"
-            else expand(rules.stack_further.output.stack, set=wildcards.set)
+            else expand(rules.stack_further.output.stack, set=wildcards.set)[0]
         ),
         moulds=lambda wildcards: (
             rules.sample_design.output.moulds
             if wildcards.set == "test"
-            else expand(rules.design_further.output.moulds, set=wildcards.set)
+            else expand(rules.design_further.output.moulds, set=wildcards.set)[0]
         ),
         weights=rules.assemble_model.output.weights,
         model=rules.assemble_model.output.model,
     output:
-        metrics=f"{RESULTS}/evaluation/{{model}}/{{set}}.csv",
+        metrics=f"{RESULTS}/evaluation/{{model}}/sets/{{set}}.csv",
     log:
         f"{RESULTS}/logs/evaluate_model/{{model}}/{{set}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/evaluate_model/{{model}}/{{set}}.tsv"
+    wildcard_constraints:
+        model="|".join(MODELS),
     threads: 1
     resources:
         mem_mb=2500,
@@ -36,11 +38,13 @@ rule evaluate_baseline:
         moulds=rules.sample_design.output.moulds,
         examples=rules.augment_dataset.output.examples,
     output:
-        metrics=f"{RESULTS}/evaluation/baselines/{{model}}.csv",
+        metrics=f"{RESULTS}/evaluation/{{model}}/sets/test.csv",
     log:
         f"{RESULTS}/logs/evaluate_baseline/{{model}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/evaluate_baseline/{{model}}.tsv"
+    wildcard_constraints:
+        model="|".join(BASELINES),
     threads: 1
     resources:
         mem_mb=2500,
@@ -50,65 +54,38 @@ rule evaluate_baseline:
         "../scripts/evaluate_baseline.py"
 
 
-rule compare_models:
-    """Every model in one table: what it costs, and its errors in multiples of the noise floor."""
-    input:
-        metrics=[
-            *expand(rules.evaluate_model.output.metrics, model=MODELS, set="test"),
-            *expand(rules.evaluate_baseline.output.metrics, model=BASELINES),
-        ],
-        weights=expand(rules.assemble_model.output.weights, model=MODELS),
-        histories=expand(rules.assemble_model.output.history, model=MODELS),
-        floor=rules.measure_floor.output.floor,
-    output:
-        table=report(
-            f"{RESULTS}/evaluation/models.csv",
-            caption="../report/models.rst",
-            category="Surrogate",
-        ),
-        summary=f"{RESULTS}/evaluation/models.json",
-    log:
-        f"{RESULTS}/logs/compare_models.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/compare_models.tsv"
-    threads: 2
-    resources:
-        mem_mb=2500,
-    params:
-        names=[*MODELS, *BASELINES],
-    script:
-        "../scripts/compare_models.py"
-
-
 rule summarise_evaluation:
-    """The surrogate's errors on the test split, by region, on further sets, and the noise floor."""
+    """A model's errors on the test split, by region, on further sets, and in multiples of the floor."""
     input:
-        metrics=expand(
-            rules.evaluate_model.output.metrics,
-            model=CONFIG.surrogate.model,
-            set=["test", *(name for name in SETS if name != "floor")],
+        metrics=lambda wildcards: expand(
+            f"{RESULTS}/evaluation/{{model}}/sets/{{set}}.csv",
+            set=JUDGED if wildcards.model in MODELS else ["test"],
+            allow_missing=True,
         ),
         floor=rules.measure_floor.output.floor,
     output:
         metrics=report(
-            f"{RESULTS}/evaluation/metrics.csv",
+            f"{RESULTS}/evaluation/{{model}}/metrics.csv",
             caption="../report/metrics.rst",
             category="Surrogate",
+            labels={"model": "{model}", "what": "errors, sample by sample"},
         ),
         summary=report(
-            f"{RESULTS}/evaluation/metrics.json",
+            f"{RESULTS}/evaluation/{{model}}/metrics.json",
             caption="../report/metrics.rst",
             category="Surrogate",
+            labels={"model": "{model}", "what": "errors"},
         ),
         regions=report(
-            f"{RESULTS}/evaluation/regions.csv",
+            f"{RESULTS}/evaluation/{{model}}/regions.csv",
             caption="../report/regions.rst",
             category="Surrogate",
+            labels={"model": "{model}", "what": "errors by region"},
         ),
     log:
-        f"{RESULTS}/logs/summarise_evaluation.log",
+        f"{RESULTS}/logs/summarise_evaluation/{{model}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/summarise_evaluation.tsv"
+        f"{RESULTS}/benchmarks/summarise_evaluation/{{model}}.tsv"
     threads: 1
     resources:
         mem_mb=800,
@@ -116,10 +93,50 @@ rule summarise_evaluation:
         "../scripts/summarise_evaluation.py"
 
 
+# The errors of the model by which tissues are fitted and drawn.
+ERRORS = {
+    name: expand(rules.summarise_evaluation.output[name], model=CONFIG.surrogate.model)[
+        0
+    ]
+    for name in ("metrics", "summary", "regions")
+}
+
+
+rule compare_models:
+    """Every model in one table: what it costs, and its errors in multiples of the noise floor."""
+    input:
+        summaries=expand(
+            rules.summarise_evaluation.output.summary, model=[*MODELS, *BASELINES]
+        ),
+        regions=expand(rules.summarise_evaluation.output.regions, model=MODELS),
+        weights=expand(rules.assemble_model.output.weights, model=MODELS),
+        histories=expand(rules.assemble_model.output.history, model=MODELS),
+    output:
+        table=report(
+            f"{RESULTS}/evaluation/models.csv",
+            caption="../report/models.rst",
+            category="Surrogate",
+        ),
+        regions=report(
+            f"{RESULTS}/evaluation/models_by_region.csv",
+            caption="../report/models_by_region.rst",
+            category="Surrogate",
+        ),
+    log:
+        f"{RESULTS}/logs/compare_models.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/compare_models.tsv"
+    threads: 2
+    resources:
+        mem_mb=2500,
+    script:
+        "../scripts/compare_models.py"
+
+
 rule evaluate:
     """The errors of every model."""
     input:
-        rules.summarise_evaluation.output,
+        list(ERRORS.values()),
         rules.compare_models.output,
         rules.measure_floor.output,
         f"{RESULTS}/shipped/card.md",
@@ -131,8 +148,8 @@ rule ship:
         weights=SURROGATE["weights"],
         model=SURROGATE["model"],
         history=SURROGATE["history"],
-        summary=rules.summarise_evaluation.output.summary,
-        regions=rules.summarise_evaluation.output.regions,
+        summary=ERRORS["summary"],
+        regions=ERRORS["regions"],
     output:
         weights=f"{RESULTS}/shipped/weights.safetensors",
         model=f"{RESULTS}/shipped/model.json",

@@ -30,7 +30,7 @@ rule plot_fields:
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.sample_design.output.moulds,
-        metrics=rules.summarise_evaluation.output.metrics,
+        metrics=ERRORS["metrics"],
         weights=SURROGATE["weights"],
     output:
         png=report(
@@ -54,8 +54,8 @@ rule plot_fields:
 rule plot_bulk:
     """The paper's figure: eight bulk statistics, predicted against simulated."""
     input:
-        metrics=rules.summarise_evaluation.output.metrics,
-        summary=rules.summarise_evaluation.output.summary,
+        metrics=ERRORS["metrics"],
+        summary=ERRORS["summary"],
     output:
         png=report(
             f"{RESULTS}/figures/bulk.png",
@@ -101,8 +101,8 @@ rule plot_training:
 rule plot_calibration:
     """Whether bands hold what they promise."""
     input:
-        metrics=rules.summarise_evaluation.output.metrics,
-        summary=rules.summarise_evaluation.output.summary,
+        metrics=ERRORS["metrics"],
+        summary=ERRORS["summary"],
     output:
         png=report(
             f"{RESULTS}/figures/calibration.png",
@@ -125,8 +125,8 @@ rule plot_calibration:
 rule plot_regions:
     """Errors by region of the parameters, and on further sets."""
     input:
-        metrics=rules.summarise_evaluation.output.metrics,
-        regions=rules.summarise_evaluation.output.regions,
+        metrics=ERRORS["metrics"],
+        regions=ERRORS["regions"],
     output:
         png=report(
             f"{RESULTS}/figures/regions.png",
@@ -151,7 +151,7 @@ rule plot_worst:
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.sample_design.output.moulds,
-        metrics=rules.summarise_evaluation.output.metrics,
+        metrics=ERRORS["metrics"],
         weights=SURROGATE["weights"],
     output:
         png=report(
@@ -224,4 +224,5 @@ rule figures:
     input:
         expand(f"{RESULTS}/figures/{{figure}}.png", figure=FIGURES),
         expand(rules.plot_fit.output.png, tissue=CONFIG.fit.tissues),
+        expand(rules.plot_valley.output.png, tissue=CONFIG.fit.tissues),
         rules.sweep.input,

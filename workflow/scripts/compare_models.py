@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from raptor.evaluation import compare, summarise
+from raptor.evaluation import compare
 from raptor.files import atomic_path
 from raptor.jobs import logged
 from raptor.surrogate.costs import costs_of
@@ -14,15 +14,16 @@ from raptor.surrogate.files import describe, load
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    floor = pd.read_csv(snakemake.input.floor)
-    names, costs = snakemake.params.names, []
+    summaries = {
+        Path(summary).parent.name: json.loads(Path(summary).read_text())["test"]
+        for summary in snakemake.input.summaries
+    }
+    costs: dict[str, dict] = {name: {"model": name} for name in summaries}
     for weights, history in zip(snakemake.input.weights, snakemake.input.histories, strict=True):
         folder = Path(weights).parent
-        costs.append({"model": folder.name} | costs_of(load(folder), describe(folder), pd.read_csv(history)))
-    costs += [{"model": name} for name in names[len(costs) :]]
-    tables = zip(names, snakemake.input.metrics, strict=True)
-    summaries = {name: summarise(pd.read_csv(metrics), floor) for name, metrics in tables}
+        costs[folder.name] |= costs_of(load(folder), describe(folder), pd.read_csv(history))
     with atomic_path(Path(snakemake.output.table)) as path:
-        compare(summaries, costs).to_csv(path, index=False)
-    with atomic_path(Path(snakemake.output.summary)) as path:
-        path.write_text(json.dumps(summaries, indent=1) + "\n")
+        compare(summaries, costs.values()).to_csv(path, index=False)
+    regions = {Path(file).parent.name: pd.read_csv(file) for file in snakemake.input.regions}
+    with atomic_path(Path(snakemake.output.regions)) as path:
+        pd.concat(table.assign(model=name) for name, table in regions.items()).to_csv(path, index=False)

@@ -26,6 +26,11 @@ with logged(snakemake.log[0]):
         {"source": "prediction", **fit["surrogate"]},
         {"source": "simulation", **fit["simulation"]},
     ]
+    if snakemake.input.simulator:
+        path, tissue = (Path(name) for name in snakemake.input.simulator)
+        (other,) = read_shard(tissue).records
+        stacks["fit by simulator"] = record_fields(other, pixels)
+        rows.append({"source": "fit by simulator", **json.loads(path.read_text())["simulation"]})
     threshold = density_threshold(surrogate.layers, pixels)
     densities = {name: stack[0] for name, stack in stacks.items()}
     save(fit_figure(mould, densities, threshold, rows), Path(snakemake.output.png).with_suffix(""))

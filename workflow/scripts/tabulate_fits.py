@@ -8,5 +8,6 @@ from raptor.fitting import tabulate
 from raptor.jobs import logged
 
 with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.table)) as path:
-    table = tabulate([json.loads(Path(fit).read_text()) for fit in snakemake.input.fits])
-    table.to_csv(path, index=False)
+    named = (snakemake.input.get(name, []) for name in ("fits", "simulators"))
+    fits, simulators = ([json.loads(Path(file).read_text()) for file in files] for files in named)
+    tabulate(fits, simulators).to_csv(path, index=False)

@@ -9,6 +9,8 @@ import typer
 
 from raptor.cli.data import check, progress, reference, same, trace, well
 from raptor.cli.draw import draw
+from raptor.cli.fit import fit
+from raptor.cli.measure import measure
 from raptor.cli.predict import predict
 from raptor.cli.simulate import simulate
 from raptor.errors import RaptorError
@@ -23,7 +25,7 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    draw, simulate, predict, check, trace, same, progress, well, reference,
+    draw, simulate, predict, fit, measure, check, trace, same, progress, well, reference,
 )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from raptor.configuration.reading import load, parse, require_castable
 from raptor.configuration.sweep import Sweep
-from raptor.configuration.tissues import Tissue, load_tissue, load_tissues
+from raptor.configuration.tissues import Tissue, load_tissue, load_tissues, require_measured
 from raptor.configuration.whole import Configuration, content_hash
 
 __all__ = [
@@ -15,4 +15,5 @@ __all__ = [
     "load_tissues",
     "parse",
     "require_castable",
+    "require_measured",
 ]

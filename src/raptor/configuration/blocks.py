@@ -158,10 +158,10 @@ class Surrogate(Block):
         ge=0,
         description="weight of the discriminator's judgement, 0 without one; null: 1, or 0 but for pix2pix",
     )
-    loss: Literal["l1", "relative"] | None = Field(
-        None,
+    loss: Literal["l1", "relative"] = Field(
+        "l1",
         description="distance to the target: mean absolute error, or root mean square error over the "
-        "target's deviation, a sample and field; null: l1 for pix2pix, else relative",
+        "target's deviation, a sample and field",
     )
     pixels: Literal[16, 32, 64, 128, 256] | None = Field(
         None,
@@ -219,3 +219,32 @@ class Fit(Block):
     starts: Literal[16, 32, 64, 128, 256] = Field(
         64, description="points of the Sobol sequence from which fits start"
     )
+    simulations: int = Field(
+        24, ge=0, description="simulations that a fit by the simulator may make; 0: no such fit"
+    )
+    repeats: Positive = Field(2, description="further seeds of simulations again at fitted parameters")
+    error: float = Field(0.01, gt=0, lt=1, description="standard error of a measured area or width ratio")
+    points: Literal[32, 64, 128, 256, 512, 1024] = Field(
+        256, description="points at which the surrogate surveys the parameters, for posterior and profiles"
+    )
+    draws: int = Field(
+        8,
+        ge=0,
+        description="simulations at draws from the posterior: the surrogate's error there, and thickness; "
+        "below 5 no thickness",
+    )
+    joint: tuple[Name, ...] = Field(
+        (), description="tissues, two or more of those fitted, to fit together with common parameters too"
+    )
+    unmeasured: tuple[Name, ...] = Field(
+        (), description="tissues of which only the paper's delta is known, to simulate there, not to fit"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Fit":
+        strange = sorted(set(self.joint) - set(self.tissues))
+        if strange:
+            raise ValueError(f"joint has '{strange[0]}', which is not in tissues; add it there")
+        if len(self.joint) == 1 or len(set(self.joint)) < len(self.joint):
+            raise ValueError("joint needs two tissues or more, each once; or leave it empty")
+        return self

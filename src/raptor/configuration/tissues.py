@@ -19,7 +19,7 @@ from raptor.parameters import CellParameters
 
 
 class Tissue(Block):
-    """A tissue that was measured, and the mould it grew in."""
+    """A tissue and the mould it grew in: measured, or known by its delta alone."""
 
     description: str = Field(description="cells, gel and source of the measurement")
     mould: str = Field(description="mould file, an approximation documented in it")
@@ -44,9 +44,17 @@ class Tissue(Block):
 
     @model_validator(mode="after")
     def _measured(self) -> "Tissue":
-        if self.area_ratio is None and self.width_ratio is None:
-            raise ValueError("neither area_ratio nor width_ratio is given; a fit needs one of them")
+        if not self.measured and "delta" not in self.paper:
+            raise ValueError(
+                "neither area_ratio nor width_ratio is given; a fit needs one of them (or, for a tissue to "
+                "be simulated and not fitted, the paper's delta)"
+            )
         return self
+
+    @property
+    def measured(self) -> bool:
+        """Whether there is anything to fit."""
+        return self.area_ratio is not None or self.width_ratio is not None
 
 
 def load_tissues(
@@ -65,6 +73,25 @@ def load_tissues(
         chosen[name] = _tissue(content, name, path)
         _require_measurable(chosen[name], name, mould_scale)
     return chosen
+
+
+def require_measured(tissues: Mapping[str, Tissue], unmeasured: Mapping[str, Tissue]) -> None:
+    """Find out before any work that tissues to fit were measured, and that the others have a delta.
+
+    Raises
+    ------
+    RaptorError
+        Where one was not, or has none.
+    """
+    for name, tissue in tissues.items():
+        if not tissue.measured:
+            raise RaptorError(
+                f"tissue {name} has neither area_ratio nor width_ratio, so it cannot be fitted; name it in "
+                "fit.unmeasured instead of fit.tissues"
+            )
+    for name, tissue in unmeasured.items():
+        if "delta" not in tissue.paper:
+            raise RaptorError(f"tissue {name} has no paper: {{delta: ...}} to be simulated at; give it one")
 
 
 def load_tissue(path: Path, name: str) -> Tissue:

@@ -157,16 +157,16 @@ def check_stack(path: Path) -> Iterator[str]:
         yield from _check_variables(file, Path(path).name, images=False)
         yield from _check_field_names(file, Path(path).name)
     table = read_table(path)
-    first_seen: dict[bytes, Sample] = {}
+    first_seen: dict[bytes, tuple[int, str]] = {}  # not samples: they would all stay in memory
     for sample in read_samples(path, range(len(table.split))):
         where = f"{Path(path).name}: simulation {sample.simulation}"
         yield from _check_fields(sample, where)
         for image in mould_images(sample):
-            other = first_seen.setdefault(image, sample)
-            if other.split != sample.split:
+            other, split = first_seen.setdefault(image, (sample.simulation, sample.split))
+            if split != sample.split:
                 yield (
-                    f"{where} ({sample.split}) has the mould of simulation {other.simulation} "
-                    f"({other.split}), as it is or turned or mirrored: one mould in two splits"
+                    f"{where} ({sample.split}) has the mould of simulation {other} "
+                    f"({split}), as it is or turned or mirrored: one mould in two splits"
                 )
                 break
 

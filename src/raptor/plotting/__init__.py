@@ -5,7 +5,6 @@ from raptor.plotting.drawing import (
     design_figure,
     draw_mould,
     fields_figure,
-    fit_figure,
     folding_figure,
     mould_figure,
     new_figure,
@@ -16,6 +15,7 @@ from raptor.plotting.drawing import (
     show_field,
     tradeoff_figure,
 )
+from raptor.plotting.fits import fit_figure, valley_figure
 from raptor.plotting.judging import (
     calibration_figure,
     models_figure,
@@ -48,5 +48,6 @@ __all__ = [
     "show_field",
     "tradeoff_figure",
     "training_figure",
+    "valley_figure",
     "worst_figure",
 ]

@@ -227,41 +227,6 @@ def design_figure(table: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
 
 
 @STYLED
-def fit_figure(
-    mould: Mould,
-    densities: Mapping[str, NDArray[np.floating]],
-    threshold: float,
-    rows: Sequence[Mapping[str, Any]],
-) -> Figure:
-    """Densities (y, x) of a fitted tissue in its mould, its outline, and the ratios beside the target."""
-    figure = new_figure(10.5, 3.4)
-    panels = figure.subplots(1, len(densities) + 1)
-    limit = max(float(density.max()) for density in densities.values())
-    for axes, (name, density) in zip(panels, densities.items(), strict=False):
-        shown = show_field(axes, density, "density", limit)
-        axes.contour(
-            density,
-            [threshold],
-            origin="lower",
-            extent=(-HALF, HALF, -HALF, HALF),
-            colors="white",
-            linewidths=0.8,
-        )
-        draw_mould(axes, mould, fill=False)
-        axes.set_title(name)
-    figure.colorbar(shown, ax=panels[:-1], shrink=0.8, label="density per pixel")
-    colours = (THIRD, PREDICTED, SIMULATED)
-    for offset, (row, colour) in enumerate(zip(rows, colours, strict=False)):
-        values = [row["area_ratio"], row["width_ratio"]]
-        heights = [np.nan if value is None else value for value in values]
-        panels[-1].bar(np.arange(2) + 0.27 * (offset - 1), heights, 0.25, color=colour, label=row["source"])
-    panels[-1].set_xticks([0, 1], ["$A/A_0$", "$w/w_0$"])
-    panels[-1].set_ylim(0, 1.35)
-    panels[-1].legend(frameon=False, loc="upper center", fontsize=8)
-    return figure
-
-
-@STYLED
 def tradeoff_figure(table: pd.DataFrame) -> Figure:
     """Error of density, and energy, against cost: one small point a case, a large median a method.
 

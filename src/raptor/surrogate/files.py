@@ -26,6 +26,7 @@ from raptor.surrogate.networks import Architecture, Generator
 from raptor.symmetry import FIELDS
 
 SHIPPED = Path(__file__).parent / "shipped"
+WIDEST = 1.96  # standard deviations of a normal error in the widest band
 POINTS = "novelty.points"
 WEIGHTS, MODEL = "weights.safetensors", "model.json"
 
@@ -140,7 +141,7 @@ def _of_member(tensors: Mapping[str, Tensor], number: int) -> dict[str, Tensor]:
 
 
 def write_prediction(path: Path, prediction: Prediction, mould: Mould, parameters: CellParameters) -> None:
-    """Write a prediction, in physical units, with the half widths of its bands."""
+    """Write a prediction, in physical units, with standard deviations of its error."""
     pixels = prediction.fields.shape[-1]
     with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
         file.mould = mould.name
@@ -153,8 +154,11 @@ def write_prediction(path: Path, prediction: Prediction, mould: Mould, parameter
             variable(file, axis, (axis,), pixel_centres(pixels), f"pixel centre {axis}, in l0")
         image = ("field", "y", "x")
         variable(file, "fields", ("sample", *image), prediction.fields[None], "fields, per pixel")
-        bands = prediction.field_bands.half[None]
-        variable(file, "fields_band", ("sample", "level", *image), bands, "half width of the band, per pixel")
+        deviation = prediction.field_bands.half[-1][None] / WIDEST
+        text = (
+            f"deviation of the error, per pixel: {WIDEST} of it hold {100 * LEVELS[-1]:.0f} % of simulations"
+        )
+        variable(file, "fields_std", ("sample", *image), deviation, text)
         for name, value in asdict(parameters).items():
             variable(file, name, ("sample",), [value], name)
         for column, (name, text) in enumerate((("area_ratio", "A/A0"), ("width_ratio", "w/w0"))):

@@ -83,20 +83,17 @@ def rules_of(settings: Mapping[str, Any], seed: int, threads: int, device: str) 
     """The training that a configuration's block `surrogate` asks for."""
     names = (
         "epochs", "batch_size", "learning_rate", "beta1", "lambda_l1", "workers", "precision", "compiled",
-        "deterministic",
+        "deterministic", "loss",
     )  # fmt: skip
-    published = settings["network"] == "pix2pix"
     judged = settings["adversarial"]
     if judged is None:
-        judged = 1.0 if published else 0.0
-    loss = settings["loss"] or ("l1" if published else "relative")
+        judged = 1.0 if settings["network"] == "pix2pix" else 0.0
     return TrainingRules(
         **{name: settings[name] for name in names},
         seed=seed % 2**63,
         threads=threads,
         device=device,
         adversarial=judged,
-        loss=loss,
     )
 
 

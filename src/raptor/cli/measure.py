@@ -1,0 +1,64 @@
+"""raptor measure: area ratio, width ratio and outline of a tissue in a photograph."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from raptor.cli.options import Json, Scale, require_writable
+
+Picture = Annotated[Path, typer.Argument(help="photograph, or mask of two values (PNG, TIFF, JPEG)")]
+Look = Annotated[str, typer.Option("--tissue", help="bright, dark or auto: how it looks beside the floor")]
+Threshold = Annotated[
+    float | None, typer.Option(help="brightness that parts tissue and floor, over the plate's; Otsu's")
+]
+Landmarks = Annotated[
+    list[str] | None,
+    typer.Option("--landmark", help='"column,row=x,y" or "column,row=tether 1"; twice or more'),
+]
+Aligned = Annotated[bool, typer.Option("--aligned", help="the image is the mould's, 62.5 l0 wide")]
+Mirrored = Annotated[bool, typer.Option("--mirrored", help="taken from below or in a mirror")]
+
+
+def measure(
+    image: Picture,
+    mould: Annotated[Path, typer.Option(help="mould: GeoJSON, SVG or PNG (docs/moulds.md)")],
+    scale: Scale = None,
+    look: Look = "auto",
+    threshold: Threshold = None,
+    landmarks: Landmarks = None,
+    aligned: Aligned = False,
+    mirrored: Mirrored = False,
+    overlay: Annotated[Path | None, typer.Option(help="PNG to write, to check by eye")] = None,
+    outline: Annotated[Path | None, typer.Option(help="GeoJSON of the tissue's outline, in l0")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask.
+
+    Example:
+      raptor measure photograph.png --mould config/moulds/four_post_rectangle.geojson
+          --overlay overlay.png --outline tissue.geojson
+    """
+    from raptor import measuring
+    from raptor.files import atomic_path
+    from raptor.measuring.report import as_feature, as_record, as_sentence
+    from raptor.moulds import read_mould
+
+    appearance, shape = measuring.tissue_named(look), read_mould(mould, scale)
+    for output in filter(None, (overlay, outline)):
+        require_writable(output, "a file")
+    picture = measuring.read_picture(image)
+    registration = measuring.register(picture, shape, landmarks or (), aligned, mirrored)
+    measured = measuring.measure(picture, shape, registration, appearance, threshold)
+    if overlay is not None:
+        from raptor.measuring.overlay import write_overlay
+
+        write_overlay(overlay, picture, shape, measured)
+    if outline is not None:
+        with atomic_path(outline) as temporary:
+            temporary.write_text(json.dumps(as_feature(measured, picture, shape)) + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(json.dumps(as_record(measured, picture, shape)))
+    else:
+        typer.echo(f"{image}: {as_sentence(measured, picture)}")

@@ -1,0 +1,83 @@
+"""What can be measured on a tissue beside its area and central width, and how well.
+
+Errors are standard errors of one measurement: of ratios as of A/A0, of the mean orientation as polarised
+light or a stained section gives it, of tension a tenth of its value (its unit, kappa0 l0, must be known too),
+of thickness as focusing through the gel gives it. They are assumptions, to be replaced by a laboratory's own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.condor.accuracy import Simulation
+from raptor.fitting.targets import RATIOS
+from raptor.morphology import area_ratio, long_axis, section_ratio, sections, width_ratio
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.symmetry import FIELDS
+
+STATIONS = (0.25, 0.5, 0.75)  # of half the long side, from the centre
+WIDTHS = tuple(f"width_{round(100 * place)}" for place in STATIONS)
+SEEN = (*RATIOS, *WIDTHS, "alignment", "upright", "tension")
+"""What fields show, in the order of `seen`."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A further measurement.
+
+    Parameters
+    ----------
+    name, label : str
+        For files and for figures.
+    parts : tuple of str
+        What is measured, of `SEEN` or "thickness".
+    error : float
+        Standard error of each part; where `relative`, over its value.
+    """
+
+    name: str
+    label: str
+    parts: tuple[str, ...]
+    error: float
+    relative: bool = False
+
+
+CANDIDATES = (
+    Candidate("area_ratio", "area $A/A_0$", ("area_ratio",), 0.01),
+    Candidate("width_ratio", "central width $w/w_0$", ("width_ratio",), 0.01),
+    Candidate("outline", "shape: widths along the tissue", WIDTHS, 0.01),
+    Candidate("alignment", "alignment along the mould", ("alignment",), 0.02),
+    Candidate("upright", "orientation out of the plane", ("upright",), 0.02),
+    Candidate("tension", "mean tension", ("tension",), 0.1, relative=True),
+    Candidate("thickness", "thickness", ("thickness",), 0.02),
+)
+"""Every further measurement that is weighed."""
+
+
+def seen(fields: NDArray[np.floating], mould: Mould, threshold: float) -> NDArray[np.float64]:
+    """What the eight fields (8, y, x) of a tissue show of `SEEN`, (8,).
+
+    Widths are w/w0 on pairs of sections at `STATIONS` to both sides of the centre. alignment is the mean
+    over cells of (s.a)^2 - (s.b)^2, a along the mould's long side and b across it, upright that of (s.z)^2;
+    tension is the mean over cells, kappa0 l0.
+    """
+    density = fields[0]
+    sums = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
+    _, half = long_axis(mould)
+    cosine, sine = half / np.hypot(*half)
+    along = (cosine**2 - sine**2) * (sums["sxsx"] - sums["sysy"]) + 4 * cosine * sine * sums["sxsy"]
+    widths = [section_ratio(density, mould, threshold, sections(mould, (-p, p))) for p in STATIONS]
+    means = [value / sums["density"] for value in (along, sums["szsz"], sums["tension"])]
+    area = area_ratio(density, mould_image(mould, density.shape[-1]), threshold)
+    return np.array([area, width_ratio(density, mould, threshold), *widths, *means])
+
+
+def thickness_ratio(simulation: Simulation) -> float:
+    """Thickness of a simulated tissue over that of the gel as cast: standard deviations of cells' heights.
+
+    NaN of a single layer.
+    """
+    cast = float(simulation.sites[:, 2].std())
+    return float(simulation.positions[:, 2].std()) / cast if cast > 0 else float("nan")

@@ -1,0 +1,180 @@
+"""Fits to the whole outline of a tissue, from an image: what two ratios leave open, its shape may decide.
+
+The outline is where density crosses the threshold of tissue. Residuals are signed distances from points
+spread evenly along the measured outline to the predicted one, positive where the prediction is too large;
+both are found to a part of a pixel (marching squares).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+from skimage.filters import threshold_otsu
+from skimage.measure import find_contours
+
+from raptor.errors import RaptorError
+from raptor.files import read_input
+from raptor.fitting.least_squares import Minimum
+from raptor.fitting.targets import Measure, as_array, parameters_at
+from raptor.moulds.bitmap import DAMAGE, MOST_PIXELS
+from raptor.moulds.geometry import IMAGE_SIZE
+from raptor.moulds.raster import pixel_size
+from raptor.parameters import CellParameters
+
+POINTS = 128  # along the measured outline
+SPECK = 0.01  # of the tissue's area, below which a piece of an image is dirt
+APART = 4.0  # l0; how far apart points of an outline are before their errors differ
+STEP = 0.02  # of finite differences
+
+Densities = Callable[[Sequence[CellParameters]], Any]
+"""From n sets of parameters to densities (n, y, x)."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outline of a tissue.
+
+    Parameters
+    ----------
+    points : ndarray (n, 2)
+        Evenly along it, x and y, l0.
+    length : float
+        Of the outline, l0.
+    """
+
+    points: NDArray[np.float64]
+    length: float
+
+    @classmethod
+    def along(cls, tissue: shapely.Geometry, count: int = POINTS) -> "Outline":
+        """Points spread evenly along the outer boundaries of a tissue."""
+        rings = [shapely.Polygon(part.exterior).exterior for part in shapely.get_parts(tissue)]
+        length = sum(ring.length for ring in rings)
+        places = [np.arange(0, ring.length, length / count) for ring in rings]
+        points = [
+            shapely.line_interpolate_point(ring, each) for ring, each in zip(rings, places, strict=True)
+        ]
+        return cls(shapely.get_coordinates(np.concatenate(points)), float(length))
+
+
+def read_outline(path: Path) -> Outline:
+    """Read the outline of a tissue from a picture (PNG, JPEG, TIFF) whose frame is the image of 62.5 l0.
+
+    The tissue is what differs from the rim of the picture; its edge is half-way between both colours (Otsu).
+    Bring the picture into the frame of the mould first: square, the mould's centre in its middle.
+
+    Raises
+    ------
+    RaptorError
+        Where the picture cannot be read, is not square, or shows no tissue.
+    """
+    grey = _grey(Path(path))
+    rim = np.concatenate([grey[0], grey[-1], grey[:, 0], grey[:, -1]])
+    if grey.min() == grey.max():
+        raise RaptorError(f"outline {path} is of one colour; paint the tissue dark on white")
+    dark = grey <= threshold_otsu(grey)
+    level = float(np.median(grey[dark]) + np.median(grey[~dark])) / 2  # half-way, where edges are soft
+    excess = level - grey if np.median(rim) > level else grey - level
+    return Outline.along(_pieces(excess[::-1], f"outline {path}"))  # the first row of a picture is on top
+
+
+def outline_of(density: NDArray[np.floating], threshold: float) -> Outline:
+    """The outline of a tissue from its density (y, x).
+
+    Raises
+    ------
+    RaptorError
+        Where the density is nowhere above the threshold.
+    """
+    return Outline.along(_pieces(density - threshold, "the density"))
+
+
+def distances(outline: Outline, density: NDArray[np.floating], threshold: float) -> NDArray[np.float64]:
+    """Signed distances (n,) of an outline's points to the edge of a density (y, x), positive inside it, l0.
+
+    NaN where the density is nowhere above the threshold.
+    """
+    try:
+        tissue = _pieces(density - threshold, "the density")
+    except RaptorError:
+        return np.full(len(outline.points), np.nan)
+    edge = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(tissue)])
+    points = shapely.points(outline.points)
+    shapely.prepare(edge)
+    apart = np.asarray(shapely.distance(points, edge.boundary), dtype=np.float64)
+    inside = np.asarray(shapely.contains(edge, points), dtype=bool)
+    return np.where(inside, apart, -apart)
+
+
+def outline_measure(densities: Densities, outline: Outline, threshold: float) -> Measure:
+    """Signed distances (n, points) of an outline to what a model predicts, over the root of their number.
+
+    The residual sum of squares is then the mean square distance, l0^2.
+    """
+
+    def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
+        found = [distances(outline, density, threshold) for density in densities(parameters)]
+        return np.asarray(np.array(found) / np.sqrt(len(outline.points)))
+
+    return measure
+
+
+def deviations(
+    measure: Measure, minimum: Minimum, outline: Outline, error: float, step: float = STEP
+) -> NDArray[np.float64]:
+    """Standard errors (3,) of the parameters of a fit to an outline, from its slope at the minimum.
+
+    Each stretch of `APART` of the outline counts as one measurement, with the larger of `error` (l0) and the
+    residual root mean square distance. Infinite where the outline leaves a combination open.
+    """
+    steps = np.where(minimum.unit + step <= 1, step, -step)
+    moved = [parameters_at(unit) for unit in (minimum.unit, *(minimum.unit + np.diag(steps)))]
+    here, *there = measure(moved)
+    change = as_array(moved)[1:] - as_array(moved)[0]
+    slope_of_cube = np.stack([(each - here) for each in there], axis=1)
+    slope = slope_of_cube @ np.linalg.inv(change).T
+    independent = max(outline.length / APART, 1.0)
+    variance = max(error**2, minimum.rss)
+    information = independent * slope.T @ slope / variance
+    if np.linalg.matrix_rank(information, tol=1e-9 * float(np.trace(information))) < 3:
+        return np.full(3, np.inf)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+
+
+def _grey(path: Path) -> NDArray[np.float64]:
+    """Lightness (row, column) of a square picture, 0 to 1."""
+    content = read_input(path, "outline", "a picture")
+    try:
+        picture = Image.open(BytesIO(content), formats=["PNG", "JPEG", "TIFF"])
+        if picture.width != picture.height or picture.width > MOST_PIXELS:
+            raise RaptorError(
+                f"outline {path} is {picture.width} x {picture.height} pixels large; crop it to the square "
+                f"frame of {IMAGE_SIZE} l0 about the mould's centre, at most {MOST_PIXELS} pixels a side"
+            )
+        layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
+    except RaptorError:
+        raise
+    except DAMAGE as error:
+        raise RaptorError(f"outline {path} is no picture, or is cut short: {error}") from error
+    opacity = layers[..., 3]
+    return np.asarray(layers[..., :3].mean(axis=2) * opacity + 1 - opacity)
+
+
+def _pieces(excess: NDArray[np.floating], what: str) -> shapely.Geometry:
+    """Where a field (y, x) on the image's raster is positive, without specks, l0."""
+    size = pixel_size(excess.shape[-1])
+    padded = np.pad(excess, 1, constant_values=min(float(excess.min()), -1e-6))
+    origin = -IMAGE_SIZE / 2 - size / 2
+    lines = [shapely.LineString(line[:, ::-1] * size + origin) for line in find_contours(padded, 0.0)]
+    found = shapely.get_parts(shapely.build_area(shapely.MultiLineString(lines)))
+    if len(found) == 0:
+        raise RaptorError(f"{what} shows no tissue")
+    areas = shapely.area(found)
+    kept: shapely.Geometry = shapely.MultiPolygon(list(found[areas > SPECK * areas.sum()]))
+    return kept

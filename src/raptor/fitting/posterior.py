@@ -1,0 +1,307 @@
+"""What measurements say of the parameters: a posterior over the whole region, and profile likelihoods.
+
+The surrogate is evaluated at Sobol points that fill the region; between them what it says is interpolated
+(cubic radial functions), so that tens of thousands of further Sobol points cost nothing. Each is weighed by
+its likelihood: in three dimensions this is plain quadrature, with no chain that could miss an end of the
+valley.
+
+The likelihood of a measured ratio m at predicted ratio p is normal with
+
+    sigma^2 = error^2 + (h / 1.96)^2 + i^2,
+
+where `error` is that of the measurement, h the half width of the surrogate's calibrated 95 % band there, and
+i what interpolation errs by. The prior is the paper's distribution: delta uniform, both kappas uniform over
+their bounded plane.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RBFInterpolator
+from scipy.linalg import eigh
+from scipy.stats import chi2, norm, qmc
+
+from raptor.condor.lattice import cast_sites
+from raptor.errors import RaptorError
+from raptor.fitting.measurements import SEEN, seen
+from raptor.fitting.targets import PARAMETERS, Target, as_array, parameters_at, prior_density
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
+from raptor.surrogate.calibration import LEVELS
+from raptor.surrogate.inference import Surrogate
+
+DENSE = 2**16  # points of the posterior
+BANDED = 32  # points of a survey at which bands are found
+TOGETHER = 32  # predictions at a time
+QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
+BINS = 40  # of a profile
+UNLIKELY = 0.01  # chance of so large a chi2, below which the model cannot make what was measured
+BOUNDS = dict(zip(PARAMETERS, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True))
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a model says over the whole region.
+
+    Parameters
+    ----------
+    units : ndarray (n, 3)
+        Points of the unit cube (`targets.parameters_at`).
+    values : ndarray (n, k)
+        What is seen there, in the order `names`; area and width ratio first.
+    sigma : ndarray (b, 2)
+        Standard error of the model's area and width ratio at the first b points.
+    """
+
+    units: NDArray[np.float64]
+    values: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    names: tuple[str, ...] = SEEN
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Points of the region, weighed by what was measured.
+
+    Parameters
+    ----------
+    units, parameters : ndarray (n, 3)
+        Points in the unit cube and as parameters.
+    values : ndarray (n, k)
+        What the model shows there, in the order `names`.
+    prior, weights : ndarray (n,)
+        Weights before and after the measurement; each sums to 1.
+    log_likelihood : ndarray (n,)
+    chi2 : ndarray (n,)
+        Sum of squared residuals over their variances.
+    measurements : int
+        How many were made.
+    """
+
+    units: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    values: NDArray[np.float64]
+    names: tuple[str, ...]
+    prior: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    log_likelihood: NDArray[np.float64]
+    chi2: NDArray[np.float64]
+    measurements: int
+
+    @cached_property
+    def effective(self) -> float:
+        """Number of equally weighed points that would say as much."""
+        return float(1 / (self.weights**2).sum())
+
+    def draws(self, count: int, seed: int) -> NDArray[np.intp]:
+        """Numbers of points (count,) drawn by their weights, evenly along the posterior's longest axis."""
+        along = self.units @ _longest(self)
+        order = np.argsort(along, kind="stable")
+        places = (np.arange(count) + np.random.default_rng(seed).random()) / count
+        found = np.searchsorted(np.cumsum(self.weights[order]), places)
+        return np.asarray(order[np.minimum(found, len(order) - 1)])
+
+
+def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey:
+    """Ask the surrogate about a mould's tissue at points (a power of two) that fill the region.
+
+    Predictions are means over the images of D4, as those that bands were calibrated on; bands are found at
+    the first 32 points.
+
+    Raises
+    ------
+    RaptorError
+        Where the surrogate is not calibrated, or the mould holds no cell.
+    """
+    units = qmc.Sobol(3, seed=seed).random(points)
+    parameters = [parameters_at(unit) for unit in units]
+    image, cells = mould_image(mould, surrogate.pixels), len(cast_sites(mould, surrogate.layers))
+    level = LEVELS.index(0.95)
+    bands = [surrogate.examine(mould, p).shape_bands.half[level] for p in parameters[:BANDED]]
+    values = []
+    for start in range(0, points, TOGETHER):
+        part = parameters[start : start + TOGETHER]
+        fields = surrogate.predict(image.depression, image.tethers, part, cells)
+        values += [seen(each, mould, surrogate.threshold) for each in fields]
+    return Survey(units, np.array(values), np.array(bands, dtype=float) / norm.ppf(0.975))
+
+
+def infer(found: Survey, target: Target, error: float, seed: int, dense: int = DENSE) -> Posterior:
+    """Weigh the region by what was measured with a standard error.
+
+    Raises
+    ------
+    RaptorError
+        Where the mould allows none of the measurements.
+    """
+    if not np.isfinite(found.values[:, target.columns]).all():
+        raise RaptorError(
+            "what was measured cannot be measured everywhere on this mould: a tether may fill its central "
+            "section; give the area ratio alone, or another mould"
+        )
+    units = qmc.Sobol(3, seed=seed + 1).random(dense)
+    values = interpolate(found.units, found.values, units)
+    bands = interpolate(found.units[: len(found.sigma)], found.sigma, units, smoothing=1e-2)
+    columns = target.columns
+    variance = error**2 + np.clip(bands, found.sigma.min(axis=0), found.sigma.max(axis=0)) ** 2
+    variance = (variance + interpolation_error(found)[:2] ** 2)[:, columns]
+    squares = target.residuals(values[:, :2]) ** 2 / variance
+    log_likelihood = -0.5 * (squares + np.log(2 * np.pi * variance)).sum(axis=1)
+    prior = prior_density(units)
+    weights = prior * np.exp(log_likelihood - log_likelihood.max())
+    return Posterior(
+        units,
+        as_array([parameters_at(unit) for unit in units]),
+        values,
+        found.names,
+        prior / prior.sum(),
+        weights / weights.sum(),
+        log_likelihood,
+        squares.sum(axis=1),
+        len(columns),
+    )
+
+
+def interpolate(
+    units: NDArray[np.float64],
+    values: NDArray[np.float64],
+    at: NDArray[np.float64],
+    smoothing: float = 1e-4,
+) -> NDArray[np.float64]:
+    """Values (n, k) at points (n, 3) interpolated to others (m, 3): (m, k); columns with NaN stay NaN."""
+    known = np.isfinite(values).all(axis=0)
+    answer = np.full((len(at), values.shape[1]), np.nan)
+    if known.any():
+        answer[:, known] = RBFInterpolator(
+            units, values[:, known], smoothing=smoothing, kernel="cubic", degree=2
+        )(at)
+    return answer
+
+
+def interpolation_error(found: Survey) -> NDArray[np.float64]:
+    """Root mean square error (k,) at every fourth point of a survey, interpolated from the others."""
+    left = np.arange(len(found.units)) % 4 == 0
+    guess = interpolate(found.units[~left], found.values[~left], found.units[left])
+    return np.asarray(np.sqrt(((guess - found.values[left]) ** 2).mean(axis=0)))
+
+
+def summarise(posterior: Posterior) -> dict[str, Any]:
+    """Intervals, profiles and identifiability, as JSON holds them.
+
+    Of each parameter: mean and standard deviation, prior and posterior; quantiles; the 95 % interval of the
+    profile likelihood, and whether it reaches the region's bounds, where the data set none. `directions` are
+    the combinations of parameters, over their prior deviations, from the best to the least determined, with
+    the share of the prior's deviation that is `left`. `reachable` is false where even the best point is
+    further from the measurement than errors explain: then no interval means anything.
+    """
+    profiles = {name: profile(posterior, name) for name in PARAMETERS}
+    left, directions = identified(posterior)
+    mean, deviation = moments(posterior.parameters, posterior.weights)
+    before = moments(posterior.parameters, posterior.prior)[1]
+    return {
+        "effective_points": posterior.effective,
+        "least_chi2": float(posterior.chi2.min()),
+        "reachable": bool(chi2.sf(posterior.chi2.min(), posterior.measurements) > UNLIKELY),
+        "part_of_region": float(posterior.prior[_likely(posterior)].sum()),
+        "parameters": {
+            name: {
+                "mean": float(mean[column]),
+                "std": float(deviation[column]),
+                "prior_std": float(before[column]),
+                "quantiles": _quantiles(posterior.parameters[:, column], posterior.weights),
+                "profile_interval": _interval(*profiles[name], name),
+            }
+            for column, name in enumerate(PARAMETERS)
+        },
+        "correlations": _correlations(posterior),
+        "directions": [
+            {"left": float(part), **dict(zip(PARAMETERS, map(float, direction), strict=True))}
+            for part, direction in zip(left, directions, strict=True)
+        ],
+        "determined": int((left < 0.5).sum()),
+        "profiles": {
+            name: {"value": values.tolist(), "log_likelihood": heights.tolist()}
+            for name, (values, heights) in profiles.items()
+        },
+    }
+
+
+def profile(posterior: Posterior, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A parameter's values (bins,), and at each the greatest log likelihood (bins,) over the others.
+
+    Relative to the greatest of all; -inf where no point lies.
+    """
+    bounds, column = BOUNDS[name], PARAMETERS.index(name)
+    edges = np.linspace(bounds.lower, bounds.upper, BINS + 1)
+    number = np.clip(np.searchsorted(edges, posterior.parameters[:, column], side="right") - 1, 0, BINS - 1)
+    best = np.full(BINS, -np.inf)
+    np.maximum.at(best, number, posterior.log_likelihood)
+    return (edges[1:] + edges[:-1]) / 2, best - best.max()
+
+
+def identified(posterior: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Share (3,) of the prior's deviation left along combinations of parameters (3, 3), least first.
+
+    The combinations are those of the generalised eigenvalue problem of both covariances, of length 1 in
+    parameters over their prior deviations.
+    """
+    scaled = posterior.parameters / moments(posterior.parameters, posterior.prior)[1]
+    after, before = (np.cov(scaled.T, aweights=w, ddof=0) for w in (posterior.weights, posterior.prior))
+    variances, vectors = eigh(after, before)
+    directions = vectors.T / np.linalg.norm(vectors, axis=0)[:, None]
+    return np.sqrt(np.clip(variances, 0, None)), directions
+
+
+def moments(
+    values: NDArray[np.float64], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weighed mean and standard deviation (k,) of values (n, k)."""
+    mean = weights @ values
+    return mean, np.sqrt(weights @ (values - mean) ** 2)
+
+
+def _longest(posterior: Posterior) -> NDArray[np.float64]:
+    """Direction (3,) in the cube along which the posterior is longest."""
+    covariance = np.cov(posterior.units.T, aweights=posterior.weights, ddof=0)
+    return np.asarray(np.linalg.eigh(covariance)[1][:, -1])
+
+
+def _likely(posterior: Posterior) -> NDArray[np.bool_]:
+    """Points (n,) within the joint 95 % region of the likelihood ratio of three parameters."""
+    limit = posterior.log_likelihood.max() - chi2.ppf(0.95, 3) / 2
+    return np.asarray(posterior.log_likelihood > limit)
+
+
+def _quantiles(values: NDArray[np.float64], weights: NDArray[np.float64]) -> dict[str, float]:
+    """Weighed quantiles of values (n,), by their level."""
+    order = np.argsort(values)
+    found = np.interp(QUANTILES, np.cumsum(weights[order]), values[order])
+    return {str(level): float(value) for level, value in zip(QUANTILES, found, strict=True)}
+
+
+def _interval(centres: NDArray[np.float64], heights: NDArray[np.float64], name: str) -> dict[str, Any]:
+    """Where a profile is within 95 % of a single parameter's likelihood ratio, to the width of a bin."""
+    inside = np.flatnonzero(heights > -chi2.ppf(0.95, 1) / 2)
+    half = (centres[1] - centres[0]) / 2
+    first, last = int(inside[0]), int(inside[-1])
+    return {
+        "lower": float(centres[first] - half),
+        "upper": float(centres[last] + half),
+        "open_below": first == 0,
+        "open_above": last == len(centres) - 1 or not np.isfinite(heights[last + 1]),
+    }
+
+
+def _correlations(posterior: Posterior) -> dict[str, float]:
+    """Of each pair of parameters."""
+    covariance = np.cov(posterior.parameters.T, aweights=posterior.weights, ddof=0)
+    deviation = np.sqrt(np.diag(covariance))
+    pairs = ((0, 1), (0, 2), (1, 2))
+    return {
+        f"{PARAMETERS[a]}, {PARAMETERS[b]}": float(covariance[a, b] / (deviation[a] * deviation[b]))
+        for a, b in pairs
+    }

@@ -1,0 +1,74 @@
+"""What fits find of a tissue of known parameters, a simulated one: by its ratios and by its outline."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.fitting.least_squares import minimise
+from raptor.fitting.outline import deviations, outline_measure, outline_of
+from raptor.fitting.targets import (
+    PARAMETERS,
+    Target,
+    as_array,
+    surrogate_densities,
+    surrogate_measure,
+)
+from raptor.morphology import density_threshold, shape_ratios
+from raptor.moulds.geometry import Mould
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.surrogate.inference import Surrogate
+
+ERROR = 0.25  # l0; of an outline drawn on a photograph, a pixel of the paper's image
+SEARCHES = 3  # from points of their own: where a valley is flat, they end in different places
+
+
+def recover(
+    surrogate: Surrogate,
+    mould: Mould,
+    density: NDArray[np.floating],
+    truth: CellParameters,
+    *,
+    starts: int,
+    seed: int,
+) -> dict[str, Any]:
+    """Fit a tissue of known parameters from its density (y, x): by two ratios, and by its outline.
+
+    `error` of each is the root mean square error over parameters and searches, in parts of their ranges.
+    """
+    measure, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
+    target = Target(*shape_ratios(density, mould, surrogate.layers))
+    threshold = density_threshold(surrogate.layers, density.shape[-1])
+    outline = outline_of(density, threshold)
+    coarse, apart = (
+        outline_measure(
+            surrogate_densities(surrogate, mould, averaged=averaged), outline, surrogate.threshold
+        )
+        for averaged in (False, True)
+    )
+    seeds = [seed + number for number in range(1, SEARCHES + 1)]
+    by_ratios = [minimise(measure, target.residuals, starts=starts, seed=each, fine=fine) for each in seeds]
+    by_outline = [minimise(coarse, np.asarray, starts=starts, seed=each, fine=apart) for each in seeds]
+    best = min(by_outline, key=lambda found: found.rss)
+    errors = deviations(apart, best, outline, ERROR)
+    return {
+        "truth": asdict(truth),
+        "target": asdict(target),
+        "ratios": _outcome([found.parameters for found in by_ratios], truth)
+        | {"rank": by_ratios[0].rank, "rss": min(found.rss for found in by_ratios)},
+        "outline": _outcome([found.parameters for found in by_outline], truth)
+        | {
+            "rank": best.rank,
+            "distance": float(np.sqrt(best.rss)),
+            "std": dict(zip(PARAMETERS, map(float, errors), strict=True)),
+        },
+    }
+
+
+def _outcome(found: Sequence[CellParameters], truth: CellParameters) -> dict[str, Any]:
+    """Fits and how far they are from the truth."""
+    widths = np.array([bounds.upper - bounds.lower for bounds in (DELTA, KAPPA_NNN, KAPPA_NNNN)])
+    errors = (as_array(found) - as_array([truth])) / widths
+    return {"fits": [asdict(each) for each in found], "error": float(np.sqrt((errors**2).mean()))}

@@ -1,0 +1,110 @@
+"""Fits by the simulator itself, and simulation again at fitted parameters.
+
+A simulation's area ratio varies with its seed by about 0.003. Within a fit one seed serves all points
+(common random numbers), so that differences between points are those of the parameters; simulations again
+at the fitted point have seeds of their own.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.condor.accuracy import Simulation, simulate
+from raptor.fields import rasterise
+from raptor.fitting.least_squares import Minimum, Residuals, descend
+from raptor.fitting.targets import Measure, Target
+from raptor.morphology import shape_ratios
+from raptor.moulds.geometry import Mould
+from raptor.parameters import CellParameters, NetworkModel
+
+STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
+ENOUGH = 1e-5  # residual sum of squares that noise of 0.003 from seed to seed leaves anyway
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """How tissues are simulated.
+
+    Parameters
+    ----------
+    model : NetworkModel
+    accuracy : str
+        As `condor.simulate` takes it.
+    pixels : int
+        Side of the image that shapes are measured in.
+    seed : int
+        Of every simulation, but for those that ask for a further one.
+    """
+
+    model: NetworkModel
+    accuracy: str
+    pixels: int
+    seed: int
+
+    @classmethod
+    def configured(cls, content: Mapping[str, Any]) -> "Simulator":
+        """From a configuration's block `model`, accuracy, pixels and seed."""
+        block = content["model"]
+        model = NetworkModel(block["layers"], tuple(block["shells"]), block["tension"])
+        return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
+
+    def seed_of(self, further: int) -> int:
+        """The so many-th further seed; 0: that of fits."""
+        return (self.seed + further) % 2**31
+
+    def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Simulation:
+        """Simulate a tissue, with the seed of fits or the so many-th further one."""
+        return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(further))
+
+    def fields(self, simulation: Simulation) -> NDArray[np.float64]:
+        """The eight fields (8, y, x) of a simulated tissue."""
+        return rasterise(simulation.positions, simulation.orientation, simulation.tension, self.pixels)
+
+    def ratios(self, simulation: Simulation, mould: Mould) -> NDArray[np.float64]:
+        """A/A0 and w/w0 of a simulated tissue, (2,)."""
+        return np.array(shape_ratios(self.fields(simulation)[0], mould, self.model.layers))
+
+    def measure(self, mould: Mould) -> Measure:
+        """Area and width ratio of a mould's tissue, simulated with one seed throughout."""
+
+        def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
+            return np.array([self.ratios(self.run(mould, each), mould) for each in parameters])
+
+        return measure
+
+
+def descend_by_simulation(
+    measure: Measure, residuals: Residuals, start: NDArray[np.float64], budget: int
+) -> Minimum:
+    """Fit by a measure that simulates, from a point (3,) of the unit cube, within a budget of points."""
+    return descend(measure, residuals, start, budget=budget, step=STEP, enough=ENOUGH)
+
+
+def measure_again(
+    simulations: Sequence[Simulation], simulator: Simulator, mould: Mould, target: Target
+) -> dict[str, Any]:
+    """Means and standard deviations of ratios over simulations of one tissue, and the rss of the means.
+
+    `rss_std` is the standard deviation of the residual sum of squares of single simulations.
+    """
+    ratios = np.array([simulator.ratios(simulation, mould) for simulation in simulations])
+    mean, deviation = ratios.mean(axis=0), _deviation(ratios)
+    single = np.array([target.rss(each) for each in ratios])
+    return {
+        "area_ratio": float(mean[0]),
+        "width_ratio": float(mean[1]),
+        "rss": target.rss(mean),
+        "area_ratio_std": float(deviation[0]),
+        "width_ratio_std": float(deviation[1]),
+        "rss_std": float(_deviation(single[:, None])[0]),
+        "runs": len(simulations),
+        "converged": sum(simulation.converged for simulation in simulations),
+    }
+
+
+def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation over the first axis; 0 of a single value."""
+    return values.std(axis=0, ddof=1) if len(values) > 1 else np.zeros(values.shape[1])

@@ -1,0 +1,86 @@
+"""Fits as files and tables."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from raptor.files import atomic_path
+from raptor.fitting.targets import PARAMETERS, RATIOS, Target
+
+AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")
+
+
+def write_fit(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a fit as JSON; numbers that are not finite become null."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(_plain(content), indent=1) + "\n")
+
+
+def tabulate(fits: Sequence[dict[str, Any]], simulators: Sequence[dict[str, Any]] = ()) -> pd.DataFrame:
+    """A row a tissue: target; the surrogate's fit, simulated again; the simulator's, again; the paper's."""
+    by_simulator = {content["tissue"]: content for content in simulators}
+    return pd.DataFrame([_row(content, by_simulator.get(content["tissue"])) for content in fits])
+
+
+def tabulate_joint(joint: Mapping[str, Any], fits: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Parameters fitted in common beside the separate fits' mean and spread, ours and the paper's."""
+    separate = [fit for fit in fits if fit["tissue"] in joint["targets"]]
+    rows = [
+        {"fit": "joint", **joint["surrogate"]["parameters"], "rss": joint["surrogate"]["rss"]},
+        *_mean_and_spread("separate", [fit["surrogate"]["parameters"] for fit in separate]),
+        *_mean_and_spread("paper", [fit["paper"] for fit in separate]),
+    ]
+    if joint.get("simulator"):
+        simulator = joint["simulator"]
+        rows.insert(1, {"fit": "joint, simulator", **simulator["parameters"], "rss": simulator["rss"]})
+    return pd.DataFrame(rows)
+
+
+def _row(content: Mapping[str, Any], simulator: Mapping[str, Any] | None) -> dict[str, Any]:
+    """One tissue's row."""
+    target, paper = Target(**content["target"]), content["paper"]
+    row: dict[str, Any] = {"tissue": content["tissue"]}
+    row |= {f"target_{key}": value for key, value in content["target"].items()}
+    row |= _columns("surrogate", content["surrogate"], content["simulation"])
+    if simulator is not None:
+        row |= _columns("simulator", simulator["fit"], simulator["simulation"])
+    if set(RATIOS) <= paper.keys():
+        row["paper_simulation_rss"] = target.rss(np.array([paper[name] for name in RATIOS]))
+    return row | {f"paper_{key}": value for key, value in paper.items()}
+
+
+def _columns(name: str, fit: Mapping[str, Any], again: Mapping[str, Any]) -> dict[str, Any]:
+    """A fit's columns, and those of simulations again at its parameters."""
+    row = {f"{name}_{key}": value for key, value in fit["parameters"].items()}
+    row |= {f"{name}_{key}": fit[key] for key in (*RATIOS, "rss")}
+    row |= {f"{name}_again_{key}": again[key] for key in AGAIN}
+    return row | {f"{name}_determined": fit["rank"], f"{name}_evaluations": fit["evaluations"]}
+
+
+def _mean_and_spread(name: str, fits: Sequence[Mapping[str, float]]) -> list[dict[str, Any]]:
+    """Mean and standard deviation over separate fits of each parameter."""
+    values = pd.DataFrame(fits).reindex(columns=list(PARAMETERS)).dropna()
+    if len(values) < 2:
+        return []
+    moments = {"mean": values.mean(), "standard deviation": values.std()}
+    return [
+        {"fit": f"{name}, {what}"} | dict(zip(PARAMETERS, found.tolist(), strict=True))
+        for what, found in moments.items()
+    ]
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,128 @@
+"""What a fit is made to, and the region that it searches (paper, "Parameter fitting").
+
+The paper's bounded region is seen as a unit cube: (0..1)^3 to delta, kappa_nnn, and kappa_nnnn between its
+lower bound and the upper one that kappa_nnn leaves it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.condor.lattice import cast_sites
+from raptor.morphology import area_ratio, density_threshold, width_ratio
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.parameters import (
+    DELTA,
+    KAPPA_NNN,
+    KAPPA_NNNN,
+    Bounds,
+    CellParameters,
+    largest_kappa_nnnn,
+)
+from raptor.surrogate.inference import Surrogate
+
+RATIOS = ("area_ratio", "width_ratio")
+PARAMETERS = ("delta", "kappa_nnn", "kappa_nnnn")
+
+Measure = Callable[[Sequence[CellParameters]], NDArray[np.float64]]
+"""From n sets of parameters to what is measured there, (n, k); of most, A/A0 and w/w0."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What was measured on a tissue; None where it was not."""
+
+    area_ratio: float | None
+    width_ratio: float | None
+
+    @property
+    def columns(self) -> list[int]:
+        """Which of area and width ratio were measured, by number."""
+        return [column for column, value in enumerate(self._values) if value is not None]
+
+    def residuals(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Measured (..., 2) less target (..., 1 or 2), for what the target has."""
+        wanted = np.array([self._values[column] for column in self.columns], dtype=float)
+        return np.asarray(measured[..., self.columns] - wanted)
+
+    def rss(self, measured: NDArray[np.float64]) -> float:
+        """Residual sum of squares of measured ratios (2,)."""
+        return float((self.residuals(measured) ** 2).sum())
+
+    @property
+    def _values(self) -> tuple[float | None, float | None]:
+        return self.area_ratio, self.width_ratio
+
+
+def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
+    """The paper's bounded region as a cube: (0..1)^3 to parameters with kappa_nnnn in its bound."""
+    delta, first, second = (float(v) for v in np.clip(unit, 0.0, 1.0))
+    kappa_nnn = _inside(KAPPA_NNN, first)
+    return CellParameters(_inside(DELTA, delta), kappa_nnn, _inside(_third(kappa_nnn), second))
+
+
+def unit_of(parameters: CellParameters) -> NDArray[np.float64]:
+    """Where parameters lie in the unit cube, (3,): the inverse of `parameters_at`, clipped to the cube."""
+    bounds = (DELTA, KAPPA_NNN, _third(parameters.kappa_nnn))
+    values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
+    unit = [(v - b.lower) / (b.upper - b.lower) for v, b in zip(values, bounds, strict=True)]
+    return np.clip(unit, 0.0, 1.0)
+
+
+def as_array(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
+    """Parameters as numbers (n, 3), in the order of `PARAMETERS`."""
+    return np.array([(p.delta, p.kappa_nnn, p.kappa_nnnn) for p in parameters])
+
+
+def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Density of the paper's distribution at points of the cube (n, 3), (n,), up to a factor.
+
+    delta is uniform, and so are both kappas over their bounded plane: a strip of the plane at kappa_nnn
+    counts by its length.
+    """
+    strips = [_third(_inside(KAPPA_NNN, float(first))) for first in units[:, 1]]
+    return np.array([strip.upper - strip.lower for strip in strips])
+
+
+def surrogate_measure(surrogate: Surrogate, mould: Mould, *, averaged: bool = False) -> Measure:
+    """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
+    image = mould_image(mould, surrogate.pixels)
+    threshold = density_threshold(surrogate.layers, surrogate.pixels)
+    densities_of = surrogate_densities(surrogate, mould, averaged=averaged)
+
+    def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
+        return np.array(
+            [
+                (area_ratio(density, image, threshold), width_ratio(density, mould, threshold))
+                for density in densities_of(parameters)
+            ]
+        )
+
+    return measure
+
+
+def surrogate_densities(
+    surrogate: Surrogate, mould: Mould, *, averaged: bool = False
+) -> Callable[[Sequence[CellParameters]], Any]:
+    """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate."""
+    cells = len(cast_sites(mould, surrogate.layers))
+    image = mould_image(mould, surrogate.pixels)
+
+    def densities(parameters: Sequence[CellParameters]) -> NDArray[np.float32]:
+        fields = surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=averaged)
+        return fields[:, 0]
+
+    return densities
+
+
+def _inside(bounds: Bounds, part: float) -> float:
+    return bounds.lower + part * (bounds.upper - bounds.lower)
+
+
+def _third(kappa_nnn: float) -> Bounds:
+    """Range of kappa_nnnn at a kappa_nnn."""
+    return Bounds(KAPPA_NNNN.lower, min(KAPPA_NNNN.upper, largest_kappa_nnnn(kappa_nnn)))

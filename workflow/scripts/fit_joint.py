@@ -1,0 +1,28 @@
+"""Fit several tissues with common parameters, by the surrogate and by the simulator."""
+
+import json
+from pathlib import Path
+
+import torch
+
+from raptor.files import atomic_path
+from raptor.fitting import Simulator, Target, fit_joint, surrogate_measure, tabulate_joint, write_fit
+from raptor.jobs import logged
+from raptor.moulds import read_mould
+from raptor.surrogate.files import load
+
+with logged(snakemake.log[0]):
+    torch.set_num_threads(snakemake.threads)
+    params, simulator = snakemake.params, Simulator.configured(snakemake.params.simulator)
+    fits = [json.loads(Path(path).read_text()) for path in snakemake.input.fits]
+    targets = {fit["tissue"]: Target(**fit["target"]) for fit in fits}
+    moulds = [read_mould(Path(path)).scaled(params.mould_scale) for path in snakemake.input.moulds]
+    surrogate = load(Path(snakemake.input.weights).parent)
+    predicted = [surrogate_measure(surrogate, mould) for mould in moulds]
+    refined = [surrogate_measure(surrogate, mould, averaged=True) for mould in moulds]
+    simulated = [simulator.measure(mould) for mould in moulds]
+    searches = {"starts": params.starts, "seed": simulator.seed, "budget": params.simulations}
+    content = fit_joint(targets, predicted, refined, simulated, **searches)
+    write_fit(Path(snakemake.output.fit), content)
+    with atomic_path(Path(snakemake.output.table)) as path:
+        tabulate_joint(content, fits).to_csv(path, index=False)

@@ -1,0 +1,33 @@
+"""Posterior and profiles of a tissue's parameters, and what a further measurement would tell of them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import torch
+
+from raptor.files import atomic_path
+from raptor.fitting import PARAMETERS, Simulator, Target, infer, simulate_draws, summarise, survey, write_fit
+from raptor.fitting.further import rank_measurements
+from raptor.jobs import logged, progress
+from raptor.moulds import read_mould
+from raptor.surrogate.files import load
+
+with logged(snakemake.log[0]), progress("draws", snakemake.params.draws) as done:
+    torch.set_num_threads(snakemake.threads)
+    params, fit = snakemake.params, json.loads(Path(snakemake.input.fit).read_text())
+    simulator, target = Simulator.configured(params.simulator), Target(**fit["target"])
+    mould = read_mould(Path(snakemake.input.mould)).scaled(fit["mould_scale"])
+    found = survey(load(Path(snakemake.input.weights).parent), mould, params.points, simulator.seed)
+    posterior = infer(found, target, params.error, simulator.seed)
+    sampled = simulate_draws(posterior, simulator, mould, params.draws, done)
+    drawn = posterior.draws(1000, simulator.seed)
+    columns = np.column_stack([posterior.parameters[drawn], posterior.values[drawn]])
+    points = pd.DataFrame(columns, columns=[*PARAMETERS, *posterior.names])
+    further = rank_measurements(posterior, sampled, target, simulator.seed)
+    tables = {"points": points, "draws": sampled.table, "further": further}
+    for name, table in tables.items():
+        with atomic_path(Path(snakemake.output[name])) as path:
+            table.to_csv(path, index=False)
+    write_fit(Path(snakemake.output.posterior), {"tissue": fit["tissue"], **summarise(posterior)})

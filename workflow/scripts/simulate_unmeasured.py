@@ -1,0 +1,16 @@
+"""Simulate a tissue of which only delta is known, over the range of spring constants."""
+
+from pathlib import Path
+
+from raptor.files import atomic_path
+from raptor.fitting import Simulator, simulate_at_delta
+from raptor.fitting.bound import CORNERS
+from raptor.jobs import logged, progress
+from raptor.moulds import read_mould
+
+with logged(snakemake.log[0]), progress("simulations", len(CORNERS)) as done:
+    params = snakemake.params
+    mould = read_mould(Path(snakemake.input.mould)).scaled(params.mould_scale)
+    table = simulate_at_delta(Simulator.configured(params.simulator), mould, params.delta, done)
+    with atomic_path(Path(snakemake.output.table)) as path:
+        table.to_csv(path, index=False)

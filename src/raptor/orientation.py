@@ -28,7 +28,7 @@ class Directors(NamedTuple):
     anisotropy: NDArray[np.float64]
 
 
-def directors(fields: NDArray[np.floating], threshold: float, squares: int = 64) -> Directors:
+def directors(fields: NDArray[np.floating], threshold: float, squares: int = 32) -> Directors:
     """Directors of fields (8, y, x), means over at most so many squares a side.
 
     Parameters

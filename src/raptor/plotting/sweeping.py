@@ -66,7 +66,7 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
 def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int, apart: float) -> None:
     """One set of spring constants: simulated points, predicted line and band, which ends at 0 and 100 %."""
     delta, predicted, band = curve["delta"], curve["predicted"], curve["band95"]
-    low, high = ((predicted + side * band).clip(0, 100) for side in (-1, 1))
+    low, high = (predicted - band).clip(np.minimum(predicted, 0)), (predicted + band).clip(upper=100)
     axes.fill_between(delta, low, high, color=colour, alpha=0.12, lw=0)
     axes.plot(delta, predicted, LINES[style], color=colour, lw=1.4)
     axes.errorbar(
@@ -98,10 +98,10 @@ def panels_figure(tissues: Sequence[Tissue], mould: Mould) -> Figure:
     limit = max(float(np.percentile(t.simulated[0], 99.8)) for t in tissues)
     x0, y0, x1, y1 = mould.outline.bounds
     shape = (y1 - y0 + 2 * RIM) / (x1 - x0 + 2 * RIM)
-    width = 1.0 + 2.2 * len(kappas) * len(deltas)
-    figure = new_figure(width, 0.8 + 2 * len(ratios) * (2.0 * shape + 0.15))
+    widths = [2.2 * len(kappas) + 0.3] * len(deltas) + [0.9]
+    figure = new_figure(sum(widths), 0.8 + 2 * len(ratios) * (2.0 * shape + 0.15))
     shown: Any = None
-    *blocks, margin = cast(Any, figure.subfigures(1, len(deltas) + 1, width_ratios=[8] * len(deltas) + [1]))
+    *blocks, margin = cast(Any, figure.subfigures(1, len(widths), width_ratios=widths))
     for delta, block in zip(deltas, blocks, strict=True):
         grid = block.subplots(2 * len(ratios), len(kappas), squeeze=False)
         block.suptitle(rf"$\Delta$ = {delta:g}")
@@ -117,7 +117,7 @@ def panels_figure(tissues: Sequence[Tissue], mould: Mould) -> Figure:
             if column == 0:
                 for axes, source in zip(pair, SOURCES, strict=True):
                     axes.set_ylabel(f"{RATIO} = {ratios[row]:g}\n{source}", fontsize=7)
-    margin.colorbar(shown, cax=margin.add_axes((0.1, 0.25, 0.22, 0.5)), label="density per pixel")
+    margin.colorbar(shown, cax=margin.add_axes((0.05, 0.25, 0.2, 0.5)), label="density per pixel")
     return figure
 
 
@@ -162,7 +162,7 @@ def draw_directors(axes: Axes, found: Directors) -> None:
     plain: Any = {"headwidth": 0, "headlength": 0, "headaxislength": 0, "pivot": "mid"}
     axes.quiver(
         x, y, across, up, angles="xy", scale_units="xy", scale=1, color="white", edgecolor="black",
-        linewidth=0.25, width=0.0022, zorder=0.9, **plain,
+        linewidth=0.35, width=0.0035, zorder=0.9, **plain,
     )  # fmt: skip
 
 

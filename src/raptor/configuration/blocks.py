@@ -225,7 +225,7 @@ class Fit(Block):
     repeats: Positive = Field(2, description="further seeds of simulations again at fitted parameters")
     error: float = Field(0.01, gt=0, lt=1, description="standard error of a measured area or width ratio")
     points: Literal[32, 64, 128, 256, 512, 1024] = Field(
-        256, description="points at which the surrogate surveys the parameters, for posterior and profiles"
+        128, description="points at which the surrogate surveys the parameters, for posterior and profiles"
     )
     draws: int = Field(
         8,

@@ -144,7 +144,7 @@ def minimise(
     Parameters
     ----------
     fine : Measure, optional
-        A better model, which refines what `measure` started; without it `measure` does.
+        A better model, which goes on from where `measure` ended.
     starts : int
         Points of a Sobol sequence at which the model is evaluated first (a power of two); the best four are
         refined.
@@ -162,13 +162,14 @@ def minimise(
             "nothing of what was measured can be measured on this mould: a tether may fill its central "
             "section; give the area ratio alone, or another mould"
         )
-    if fine is not None:
-        memory = _Memory(fine, residuals, 10**9, 0.0)
     for start in np.argsort(costs)[:REFINED]:
-        if np.isfinite(costs[start]) and np.isfinite(_cost(memory.residuals_at(points[start][None])[0])):
+        if np.isfinite(costs[start]):
             _descend(memory, points[start], STEP, 1e-8)
     best = memory.best()
-    return best if fine is None else replace(best, evaluations=best.evaluations + starts)
+    if fine is None:
+        return best
+    last = descend(fine, residuals, best.unit, budget=10**9, step=STEP, enough=0.0, tolerance=1e-8)
+    return replace(last, evaluations=last.evaluations + best.evaluations)
 
 
 def descend(
@@ -179,20 +180,20 @@ def descend(
     budget: int,
     step: float,
     enough: float,
+    tolerance: float,
 ) -> Minimum:
-    """Go down from a point (3,) of the unit cube, by a model that is dear and noisy.
-
-    Where the search ends before its budget does, it starts again from the valley's other side: at the best
-    point's delta, with spring constants mirrored in their ranges.
+    """Go down from a point (3,) of the unit cube, by a model that may be dear and noisy.
 
     Parameters
     ----------
     budget : int
         Evaluations at most, four for each step down.
     step : float
-        Of finite differences, over a bound's width; a search ends at steps a tenth as long.
+        Of finite differences, over a bound's width.
     enough : float
         Residual sum of squares below which the search ends.
+    tolerance : float
+        Relative length of steps, and relative gain, below which it ends.
 
     Raises
     ------
@@ -203,9 +204,7 @@ def descend(
     start = np.clip(start, *WITHIN)
     if not np.isfinite(_cost(memory.residuals_at(start[None])[0])):
         raise RaptorError("nothing of what was measured can be measured where the search starts")
-    if _descend(memory, start, step, step / 10):
-        best = memory.best().unit
-        _descend(memory, np.array([best[0], 1 - best[1], 1 - best[2]]), step, step / 10)
+    _descend(memory, start, step, tolerance)
     return memory.best()
 
 
@@ -214,11 +213,8 @@ def fit(measure: Measure, target: Target, *, starts: int, seed: int, fine: Measu
     return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed, fine=fine))
 
 
-def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> bool:
-    """SciPy's trust region reflective method within the cube; what it sees stays in memory.
-
-    Returns whether it ended by itself.
-    """
+def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> None:
+    """SciPy's trust region reflective method within the cube; what it sees stays in memory."""
 
     def residuals(unit: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(memory.residuals_at(unit[None])[0])
@@ -238,8 +234,7 @@ def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance
             max_nfev=MOST_STEPS,
         )
     except _Enough:
-        return False
-    return True
+        return
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:

@@ -6,7 +6,7 @@ at the fitted point have seeds of their own.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 
 STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
+RESTART = 5  # evaluations left, with which another start can make a step
 ENOUGH = 1e-5  # residual sum of squares that noise of 0.003 from seed to seed leaves anyway
 
 
@@ -79,8 +80,20 @@ class Simulator:
 def descend_by_simulation(
     measure: Measure, residuals: Residuals, start: NDArray[np.float64], budget: int
 ) -> Minimum:
-    """Fit by a measure that simulates, from a point (3,) of the unit cube, within a budget of points."""
-    return descend(measure, residuals, start, budget=budget, step=STEP, enough=ENOUGH)
+    """Fit by a measure that simulates, from a point (3,) of the unit cube, within a budget of points.
+
+    Where the search ends before its budget does, it starts again from the valley's other side: at the best
+    point's delta, with spring constants mirrored in their ranges.
+    """
+    rules: dict[str, float] = {"step": STEP, "enough": ENOUGH, "tolerance": STEP / 10}
+    first = descend(measure, residuals, start, budget=budget, **rules)
+    left = budget - first.evaluations
+    if first.rss < ENOUGH or left < RESTART:
+        return first
+    mirrored = np.array([first.unit[0], 1 - first.unit[1], 1 - first.unit[2]])
+    second = descend(measure, residuals, mirrored, budget=left, **rules)
+    best = min(first, second, key=lambda found: found.rss)
+    return replace(best, evaluations=first.evaluations + second.evaluations)
 
 
 def measure_again(

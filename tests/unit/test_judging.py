@@ -9,7 +9,7 @@ import torch
 
 from raptor.baselines import Nearest, baseline, training_mean
 from raptor.dataset.design import Run, read_design, write_design
-from raptor.dataset.examples import augment, training_scaling, transform_sample
+from raptor.dataset.examples import augment, training_scaling, transform_sample, with_further
 from raptor.dataset.further import CORNER, further_set
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.shards import write_shard
@@ -226,10 +226,11 @@ def test_enrichment_chooses_where_networks_disagree(surrogate):
 
 def test_examples_of_two_stacks_are_counted_through(stack):
     one, scaling = augment(stack), training_scaling(stack)
-    size = len(read_table(stack).split)
-    both = [*one, *(replace(example, sample=example.sample + size) for example in one)]
-    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, one, scaling)
-    for number in range(len(one)):
-        for offset in (0, len(one)):
-            pairs = zip(joined[number + offset], alone[number], strict=True)
-            assert all(torch.equal(a, b) for a, b in pairs)
+    table = read_table(stack)
+    both, splits = with_further(stack, one, [stack])
+    assert splits == 2 * table.split
+    learnt = [example for example in one if table.split[example.sample] == "train"]
+    assert len(both) == len(one) + len(learnt)
+    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, [*one, *learnt], scaling)
+    for number in range(len(both)):
+        assert all(torch.equal(a, b) for a, b in zip(joined[number], alone[number], strict=True))

@@ -1,10 +1,9 @@
 """Train one network of a model on the data set's examples."""
 
-from dataclasses import replace
 from pathlib import Path
 
 from raptor.configuration import content_hash
-from raptor.dataset.examples import augment, read_examples
+from raptor.dataset.examples import read_examples, with_further
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
 from raptor.device import chosen_device
@@ -16,17 +15,15 @@ from raptor.surrogate.training import describe, rules_of, train, write_history
 with logged(snakemake.log[0]):
     given, stack = snakemake.params.surrogate, Path(snakemake.input.stack)
     extra = [Path(snakemake.input.extra)] if snakemake.input.extra else []
-    table, examples = read_table(stack), read_examples(Path(snakemake.input.examples))
-    splits = list(table.split)
-    for further in extra:
-        examples += [replace(e, sample=len(splits) + e.sample) for e in augment(further, ("train",))]
-        splits += read_table(further).split
+    table, listed = read_table(stack), read_examples(Path(snakemake.input.examples))
+    examples, splits = with_further(stack, listed, extra)
     scaling = read_scaling(Path(snakemake.input.normalisation))
     architecture = architecture_of(given, table.pixels)
     device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
     rules = rules_of(given, snakemake.params.seed, snakemake.threads, device)
     # A checkpoint goes on only if configuration and data are those that it was made from.
     files = [Path(snakemake.input[name]).read_text() for name in ("examples", "normalisation")]
+    files += [str(read_table(path).parameters) for path in extra]
     identity = content_hash([snakemake.params.identity, snakemake.params.seed, *files])
     with progress("training", rules.epochs) as done:
         trained = train(

@@ -46,6 +46,22 @@ def augment(stack: Path, splits: Iterable[str] = ("train", "validation")) -> lis
     return examples
 
 
+def with_further(
+    stack: Path, examples: list[Example], further: Iterable[Path]
+) -> tuple[list[Example], list[str]]:
+    """Examples of a stack and of the training samples of further ones, and splits of all their samples.
+
+    Rows are counted through the stacks, as `ExampleSet` counts them.
+    """
+    joined, splits = list(examples), list(read_table(stack).split)
+    for other in further:
+        joined += [
+            replace(example, sample=len(splits) + example.sample) for example in augment(other, ["train"])
+        ]
+        splits += read_table(other).split
+    return joined, splits
+
+
 def training_scaling(stack: Path) -> Scaling:
     """Scaling constants from the stack's training split.
 

@@ -96,7 +96,7 @@ def test_workers_give_the_same_batches_after_the_parent_has_read(examples):
 def test_an_example_is_its_sample_moved_and_scaled(examples):
     for number in (0, 5, 11):
         example = examples.examples[number]
-        (sample,) = read_samples(examples.stack, [example.sample])
+        (sample,) = read_samples(examples.stacks[0], [example.sample])
         moved = apply(sample.fields, Element.from_index(example.element))
         found = examples.scaling.inverse(examples[number][1].numpy())
         assert np.abs(found - moved).max() < 1e-5 * np.abs(moved).max()

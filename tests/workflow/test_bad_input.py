@@ -32,7 +32,7 @@ CASE = {
         ({"sweep__ratios": [0.8]}, "above kappa_nnn/sqrt(2)"),
         ({"sweep__panels": [0.55]}, "panels has 0.55, which deltas does not have"),
         ({"sweep__moulds": ["none.geojson"]}, "none.geojson"),
-        ({"fit__tissues": ["glial"]}, "has no tissue 'glial'; did you mean 'glial_"),
+        ({"fit__tissues": ["glial"], "fit__joint": []}, "has no tissue 'glial'; did you mean 'glial_"),
         ({"fit__tissues_file": "none.yaml"}, "none.yaml cannot be read"),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
@@ -53,6 +53,7 @@ def test_a_bad_mould_of_a_tissue(workplace, tmp_path):
     tissue = {"description": "x", "mould": str(tmp_path / "cross.geojson"), "area_ratio": 0.8}
     (tmp_path / "tissues.yaml").write_text(yaml.safe_dump({"mine": tissue}))
     change = {"fit__tissues": ["mine"], "fit__tissues_file": str(tmp_path / "tissues.yaml")}
+    change |= {"fit__joint": [], "fit__unmeasured": []}
     done = workplace("cross").run("--cores", "1", configuration=variant(tmp_path, **change))
     assert done.returncode != 0
     assert "not a simple polygon" in done.stderr

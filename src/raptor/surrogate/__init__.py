@@ -1,1 +1,1 @@
-"""The surrogate: pix2pix, from mould and parameters to the eight fields."""
+"""The surrogate: networks that lead from mould and parameters to the eight fields."""

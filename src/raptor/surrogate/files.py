@@ -128,11 +128,6 @@ def load(folder: Path) -> Surrogate:
     return Surrogate(members, architecture, scaling, layers, pixels, calibration)
 
 
-def states(folder: Path) -> list[dict[str, Tensor]]:
-    """Weights of each member of a model's folder."""
-    return [dict(member.state_dict()) for member in load(folder).members]
-
-
 def _of_member(tensors: Mapping[str, Tensor], number: int) -> dict[str, Tensor]:
     """A member's part of a file's tensors, under the names that it knows, in float32."""
     prefix = f"{number}."

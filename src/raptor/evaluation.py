@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from raptor.baselines import cast_density
 from raptor.dataset.stack import Sample, read_samples, read_table
-from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse
+from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
 from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import MouldImage
@@ -51,14 +51,6 @@ def sample_measures(
         "area_ratio": area_ratio(fields[0], image, threshold),
         "width_ratio": width_ratio(fields[0], mould, threshold),
     }
-
-
-def without_sign(fields: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Fields (..., 8, y, x) with sxsz and sysz by magnitude: their sign is spontaneous."""
-    spontaneous = [FIELDS.index(field) for field in ("sxsz", "sysz")]
-    fields = fields.copy()
-    fields[..., spontaneous, :, :] = np.abs(fields[..., spontaneous, :, :])
-    return fields
 
 
 def predictor_of(surrogate: Surrogate) -> Predictor:

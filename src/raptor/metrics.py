@@ -26,6 +26,14 @@ def nrmse(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> NDA
     return np.asarray(np.sqrt(error / ((target**2).mean(axis=(-2, -1), dtype=np.float64) + 1e-12)))
 
 
+def without_sign(fields: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Fields (..., 8, y, x) with sxsz and sysz by magnitude: their sign is spontaneous."""
+    spontaneous = [FIELDS.index(field) for field in ("sxsz", "sysz")]
+    fields = fields.copy()
+    fields[..., spontaneous, :, :] = np.abs(fields[..., spontaneous, :, :])
+    return fields
+
+
 def pearson(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
     """Pearson's correlation of two equally long series; NaN where one of them is constant."""
     a, b = (np.asarray(v, dtype=np.float64) - np.mean(v, dtype=np.float64) for v in (a, b))

@@ -2,8 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from raptor.evaluation import without_sign
-from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse
+from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
 from raptor.symmetry import FIELDS
 from raptor.tradeoff import Reference, _resampled, summarise
 

@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.errors import RaptorError
+from raptor.metrics import without_sign
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import MouldImage
 from raptor.surrogate.calibration import USUAL, Calibration, fit_scale, relative_spread
 from raptor.surrogate.inference import Surrogate, deviation
 from raptor.surrogate.novelty import Novelty, descriptors
-from raptor.symmetry import FIELDS
 
 PIXELS = 400  # of each sample, chosen at random within the depression
-SIGNED = [FIELDS.index(field) for field in FIELDS if field not in ("sxsz", "sysz")]
 
 
 def calibrate(
@@ -51,7 +50,7 @@ def calibrate(
         chosen = rng.choice(inside, PIXELS, replace=len(inside) < PIXELS)
         error, wide, size = (
             part.reshape(len(part), -1)[:, chosen].T
-            for part in (_error(predicted, sample.fields), spread, np.abs(predicted[:1]))
+            for part in (without_sign(predicted) - without_sign(sample.fields), spread, np.abs(predicted[:1]))
         )
         fields.append(np.stack([error, wide, np.broadcast_to(size, error.shape)]))
         true, ours = (surrogate.shape(f, image, mould) for f in (sample.fields, predicted))
@@ -69,10 +68,3 @@ def calibrate(
 
 def _descriptors(sample: Sample) -> NDArray[np.float64]:
     return descriptors(sample.depression, sample.tethers, sample.parameters)
-
-
-def _error(predicted: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Prediction less target (8, y, x), sxsz and sysz by magnitude."""
-    error = np.asarray(np.abs(predicted) - np.abs(target))
-    error[SIGNED] = predicted[SIGNED] - target[SIGNED]
-    return error

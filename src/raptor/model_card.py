@@ -24,9 +24,9 @@ tensor is positive with density as its trace.
 **Data.** The data set `{data}` (docs/card_paper.md): {test} simulations held out, none of whose
 moulds was seen in training. Model version of the simulator {model_version}; RAPTOR {version}.
 
-**Training.** {epochs} passes over the augmented training split, batches of {batch}, Adam at {rate},
-{precision} layers, loss `{loss}`; {minutes:.0f} processor minutes for all members. Weights are
-those of the epoch with the least validation error{stored}.
+**Training.** {epochs} passes over the augmented training split{continued}, batches of {batch}, Adam
+at {rate}, {precision} layers, loss `{loss}`; {minutes:.0f} processor minutes for all members. Weights
+are those of the epoch with the least validation error{stored}.
 
 ## Errors on the held-out simulations
 VRMSE: root mean square error over the simulation's standard deviation. In floors: over the noise
@@ -92,7 +92,8 @@ def model_card(
         test=summary["samples"],
         model_version=MODEL_VERSION,
         version=__version__,
-        epochs=training["epochs"],
+        epochs=history["epoch"].max() + 1,
+        continued=_continued(training),
         batch=training["batch_size"],
         rate=training["learning_rate"],
         precision=training["precision"],
@@ -139,6 +140,18 @@ def model_card(
         kappa_nnnn="0.01 to 0.5 and kappa_nnn/sqrt(2)",
         references=REFERENCES,
     )
+
+
+def _continued(training: Mapping[str, Any]) -> str:
+    """How a training went on from another model's, in words."""
+    further = {
+        None: "",
+        "random": " with further simulations drawn at random",
+        "enriched": " with further simulations where its networks disagreed most",
+    }[training.get("extra")]
+    if training.get("continues") is None:
+        return further
+    return f", the last {training['epochs']} from the weights of `{training['continues']}`{further}"
 
 
 def _maybe(value: float | None, digits: int = 2) -> str:

@@ -86,6 +86,27 @@ def test_a_compared_model_is_the_surrogate_but_for_its_keys():
             Configuration.model_validate({"compared": changes})
 
 
+def test_a_model_continues_one_that_is_listed_before_it_and_like_it():
+    config = Configuration.model_validate(
+        {"compared": {"on": {"continues": "compact"}, "further": {"continues": "on"}}, "chosen": "on"}
+    )
+    assert (config.surrogate.model, config.chosen_model) == ("compact", "on")
+    longer = config.model_copy(update={"surrogate": config.surrogate.model_copy(update={"epochs": 9})})
+    changed = Configuration.model_validate(longer.model_dump())
+    assert all(config.model_fingerprint(n) != changed.model_fingerprint(n) for n in config.models)
+    for compared, message in (
+        ({"on": {"continues": "off"}}, "no model listed before it; allowed are compact"),
+        ({"on": {"continues": "later"}, "later": {}}, "no model listed before it; allowed are compact"),
+        ({"on": {"continues": "compact", "base_channels": 3}}, "on.base_channels differs from"),
+        ({"on": {"continues": "compact", "members": 3}}, "on.members is 3; compact"),
+        ({"gan": {"network": "pix2pix"}, "on": {"network": "pix2pix", "continues": "gan"}}, "adversarial: 0"),
+    ):
+        with pytest.raises(ValidationError, match=message):
+            Configuration.model_validate({"compared": compared})
+    with pytest.raises(ValidationError, match="chosen is 'none'; allowed are compact, pix2pix"):
+        Configuration.model_validate({"chosen": "none"})
+
+
 def test_all_tissues_can_be_fitted(root, monkeypatch):
     monkeypatch.chdir(root)
     tissues = load_tissues(root / "config" / "tissues.yaml")

@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import shapely
 import torch
@@ -16,7 +17,7 @@ from raptor.surrogate.feeding import Feeder
 from raptor.surrogate.files import load, save
 from raptor.surrogate.losses import discriminator_loss, generator_loss, relative_distance
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
-from raptor.surrogate.training import TrainingRules, train
+from raptor.surrogate.training import TrainingRules, joined, train
 
 BOX = Mould(shapely.box(-10, -5, 10, 5))
 SCALING = Scaling((0.0,) * 8, (1.0,) * 8)
@@ -79,11 +80,11 @@ def training_rules():
 def training(training_rules, made, tmp_path):
     stack = made / "dataset" / "fields.nc"
 
-    def run(epochs, name, identity="a"):
-        rules = replace(training_rules, epochs=epochs)
+    def run(epochs, name, identity="a", begun=None, **changes):
+        rules = replace(training_rules, epochs=epochs, **changes)
         return train(
             stack, augment(stack), read_table(stack).split, training_scaling(stack),
-            Architecture(32, 4, 0.5), rules, tmp_path / name, identity,
+            Architecture(32, 4, 0.5), rules, tmp_path / name, identity, begun=begun,
         )  # fmt: skip
 
     return run
@@ -93,6 +94,19 @@ def test_training_learns_and_is_repeatable(training):
     a, b = training(4, "a.pt"), training(4, "b.pt")
     assert a.history["distance"].iloc[-1] < a.history["distance"].iloc[0]
     assert all(torch.equal(a.weights[k], b.weights[k]) for k in a.weights)
+
+
+def test_training_goes_on_from_the_weights_of_another(training):
+    begun = training(3, "begun.pt")
+    still = training(1, "still.pt", "b", begun.weights, learning_rate=1e-12)
+    learnt = {name for name, _ in Generator(Architecture(32, 4, 0.5), SCALING).named_parameters()}
+    for name in learnt:
+        assert torch.allclose(still.weights[name], begun.weights[name], atol=1e-9)
+    anew, on = training(1, "anew.pt", "c"), training(1, "on.pt", "d", begun.weights)
+    assert on.history["distance"].iloc[0] < anew.history["distance"].iloc[0]
+    whole = joined(begun.history, on.history)
+    assert whole["epoch"].tolist() == [0, 1, 2, 3]
+    assert joined(pd.DataFrame(), on.history)["epoch"].tolist() == [0]
 
 
 def test_training_in_bfloat16_keeps_float32_weights(training_rules, made, tmp_path):

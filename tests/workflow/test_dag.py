@@ -12,7 +12,7 @@ from tests.workflow.test_end_to_end import variant
 EVERYTHING = {
     "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
     "augment_dataset", "check_dataset", "write_card", "train_member", "assemble_model",
-    "design_further", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
+    "design_further", "enrich", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
     "evaluate_baseline", "compare_models", "summarise_evaluation", "plot_calibration", "plot_regions",
     "plot_worst", "plot_models", "ship",
     "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "simulate_unmeasured",

@@ -88,6 +88,11 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     history = pd.read_csv(results / "surrogate" / "compact" / "training.csv")
     assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
+    enriched = pd.read_csv(results / "surrogate" / "enriched" / "training.csv")
+    assert enriched["epoch"].tolist() == [0, 1, 2]
+    assert enriched["distance"].tolist()[:2] == history["distance"].tolist()[:2]
+    candidates = pd.read_csv(results / "further" / "enriched" / "candidates.csv")
+    assert candidates["chosen"].sum() == 2
     metrics = json.loads((results / "evaluation" / "compact" / "metrics.json").read_text())
     assert set(metrics) == {"test", "corner"}
     assert metrics["test"]["samples"] == 2
@@ -99,7 +104,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert floor["runs"].tolist() == [3]
     assert (floor["vrmse_density"] > 0).all()
     models = pd.read_csv(results / "evaluation" / "models.csv").set_index("model")
-    assert models.index.tolist() == ["compact", "pix2pix", "nearest", "mean"]
+    assert models.index.tolist() == ["compact", "pix2pix", "enriched", "nearest", "mean"]
     assert (models.loc[["compact", "pix2pix"], "training_core_minutes"] > 0).all()
     assert models["density_in_floors"].notna().all()
     regions = pd.read_csv(results / "evaluation" / "compact" / "regions.csv").set_index("region")

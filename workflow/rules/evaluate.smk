@@ -95,9 +95,7 @@ rule summarise_evaluation:
 
 # The errors of the model by which tissues are fitted and drawn.
 ERRORS = {
-    name: expand(rules.summarise_evaluation.output[name], model=CONFIG.surrogate.model)[
-        0
-    ]
+    name: expand(rules.summarise_evaluation.output[name], model=CONFIG.chosen_model)[0]
     for name in ("metrics", "summary", "regions")
 }
 
@@ -167,6 +165,6 @@ rule ship:
         mem_mb=1500,
     params:
         name=CONFIG.name,
-        model=CONFIG.surrogate.model,
+        model=CONFIG.chosen_model,
     script:
         "../scripts/ship_model.py"

@@ -37,7 +37,7 @@ rule fit_tissue:
         starts=CONFIG.fit.starts,
         repeats=CONFIG.fit.repeats,
         simulator=SIMULATOR,
-        configuration=CONFIG.model_fingerprint(CONFIG.surrogate.model),
+        configuration=CONFIG.model_fingerprint(CONFIG.chosen_model),
     script:
         "../scripts/fit_tissue.py"
 
@@ -67,7 +67,7 @@ rule fit_by_simulator:
         simulations=CONFIG.fit.simulations,
         repeats=CONFIG.fit.repeats,
         simulator=SIMULATOR,
-        configuration=CONFIG.model_fingerprint(CONFIG.surrogate.model),
+        configuration=CONFIG.model_fingerprint(CONFIG.chosen_model),
     script:
         "../scripts/fit_by_simulator.py"
 

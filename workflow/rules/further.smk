@@ -27,8 +27,7 @@ rule design_further:
 rule enrich:
     """Choose further training simulations where the surrogate's networks disagree most."""
     input:
-        weights=SURROGATE["weights"],
-        model=SURROGATE["model"],
+        **FIRST,
     output:
         design=f"{RESULTS}/further/enriched/design.csv",
         moulds=f"{RESULTS}/further/enriched/moulds.geojson",

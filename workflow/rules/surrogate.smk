@@ -10,6 +10,11 @@ rule train_member:
             if MODELS[wildcards.model].extra
             else []
         ),
+        begun=lambda wildcards: (
+            f"{RESULTS}/surrogate/{MODELS[wildcards.model].continues}/members/{wildcards.member}/weights.safetensors"
+            if MODELS[wildcards.model].continues
+            else []
+        ),
         examples=rules.augment_dataset.output.examples,
         normalisation=rules.augment_dataset.output.normalisation,
         checked=rules.check_dataset.output.checked,
@@ -78,11 +83,14 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The model by which tissues are fitted and drawn.
-SURROGATE = {
-    name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate.model)[0]
-    for name in ("weights", "model", "history")
-}
+# The model that further simulations are chosen by, and the one that tissues are fitted and drawn by.
+FIRST, SURROGATE = (
+    {
+        name: expand(rules.assemble_model.output[name], model=model)[0]
+        for name in ("weights", "model", "history")
+    }
+    for model in (CONFIG.surrogate.model, CONFIG.chosen_model)
+)
 
 
 rule train:

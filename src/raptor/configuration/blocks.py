@@ -153,6 +153,10 @@ class Surrogate(Block):
     extra: Literal["enriched", "random"] | None = Field(
         None, description="further set that it is trained on beside the design's training split"
     )
+    continues: Name | None = Field(
+        None,
+        description="model whose weights training starts from, member by member, in place of random ones",
+    )
     adversarial: float | None = Field(
         None,
         ge=0,

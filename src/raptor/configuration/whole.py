@@ -51,6 +51,11 @@ class Configuration(Block):
         {"pix2pix": {"network": "pix2pix", "beta1": 0.5}},
         description="further models to compare: what surrogate is, but for the keys given, and one member",
     )
+    chosen: Name | None = Field(
+        None,
+        description="the model that tissues are fitted and figures drawn by, and that is shipped; "
+        "null: surrogate.model",
+    )
     further: Further = Field(default_factory=lambda: Further())
     fit: Fit = Field(default_factory=lambda: Fit())
     sweep: Sweep = Field(default_factory=lambda: Sweep())
@@ -76,11 +81,15 @@ class Configuration(Block):
                 )
             if model.extra and name == self.surrogate.model:
                 raise ValueError("surrogate.extra: the enriched set is chosen by surrogate; use compared")
+            if model.continues:
+                self._can_continue(name, model)
             if model.pixels is not None and model.pixels > self.fields.pixels:
                 raise ValueError(
                     f"{name}.pixels is {model.pixels}, more than fields.pixels "
                     f"({self.fields.pixels}); lower it, or leave it out"
                 )
+        if self.chosen_model not in self.models:
+            raise ValueError(f"chosen is '{self.chosen}'; allowed are {', '.join(self.models)}")
         for pixels in self.tradeoff.pixels:
             if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
                 raise ValueError(
@@ -88,6 +97,30 @@ class Configuration(Block):
                     f"({self.fields.pixels}); choose one that is"
                 )
         return self
+
+    def _can_continue(self, name: str, model: Surrogate) -> None:
+        """A model goes on from one listed before it, so that there is no circle, and of its architecture."""
+        earlier = list(self.models)[: list(self.models).index(name)]
+        if model.continues not in earlier:
+            raise ValueError(
+                f"{name}.continues is '{model.continues}', no model listed before it; allowed are "
+                f"{', '.join(earlier) or 'none'}"
+            )
+        begun = self.models[model.continues]
+        for key in ("network", "base_channels", "pixels", "patch_layers", "dropout"):
+            if getattr(model, key) != getattr(begun, key):
+                raise ValueError(f"{name}.{key} differs from that of {begun.model}, which it continues")
+        if model.members > begun.members:
+            raise ValueError(
+                f"{name}.members is {model.members}; {begun.model}, which it continues, has {begun.members}"
+            )
+        if model.network == "pix2pix" and model.adversarial != 0:
+            raise ValueError(f"{name}.continues: no discriminator is kept; set adversarial: 0")
+
+    @property
+    def chosen_model(self) -> str:
+        """Name of the model that tissues are fitted by, and that is shipped."""
+        return self.chosen or self.surrogate.model
 
     @property
     def shards(self) -> list[str]:
@@ -181,9 +214,11 @@ class Configuration(Block):
         return content_hash([self.seed, own, model, self.simulation.accuracy, MODEL_VERSION])
 
     def model_fingerprint(self, name: str) -> str:
-        """Hash of the configuration that each member of a model depends on."""
-        model = self.models[name].model_dump(mode="json", exclude={"workers", "members"})
-        return content_hash([self._depends("dataset"), model])
+        """Hash of the configuration that each member of a model depends on, and the one it continues."""
+        model = self.models[name]
+        own = model.model_dump(mode="json", exclude={"workers", "members"})
+        begun = self.model_fingerprint(model.continues) if model.continues else None
+        return content_hash([self._depends("dataset"), own, begun])
 
     def _depends(self, stage: str) -> Any:
         dump = self.model_dump(mode="json")

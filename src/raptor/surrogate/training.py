@@ -145,6 +145,7 @@ def train(
     checkpoint: Path,
     identity: str,
     progress: Callable[[int, dict[str, float]], None] = lambda epoch, row: None,
+    begun: Mapping[str, Tensor] | None = None,
 ) -> Trained:
     """Train, or go on from the checkpoint if it is of the same training.
 
@@ -154,6 +155,9 @@ def train(
         Split of each sample of the stacks, rows counted through them.
     identity : str
         Hash of everything the training hangs on; a checkpoint of another one is ignored.
+    begun : mapping of str to Tensor, optional
+        The generator's weights to start from, in place of random ones: a warm restart (Loshchilov and
+        Hutter 2017, arXiv:1608.03983).
 
     Raises
     ------
@@ -170,6 +174,8 @@ def train(
     resident = fit_on(device, list(datasets.values()))
     feeders = {name: Feeder(dataset, device, rules.workers, resident) for name, dataset in datasets.items()}
     state = _start(architecture, scaling, rules, device)
+    if begun is not None:
+        state.generator.load_state_dict(begun)
     _resume(state, checkpoint, identity)
     for epoch in range(len(state.history), rules.epochs):
         started = time.perf_counter()
@@ -334,16 +340,26 @@ def samples_a_second(architecture: Architecture, rules: TrainingRules, steps: in
     return steps * rules.batch_size / (time.perf_counter() - started)
 
 
+def joined(begun: pd.DataFrame, history: pd.DataFrame) -> pd.DataFrame:
+    """The history of a training behind that of the one that it continues, epochs counted on."""
+    return pd.concat([begun, history.assign(epoch=history["epoch"] + len(begun))], ignore_index=True)
+
+
 def write_history(path: Path, history: pd.DataFrame) -> None:
     """Write one row an epoch as CSV."""
     with atomic_path(path) as temporary:
         history.to_csv(temporary, index=False)
 
 
-def describe(architecture: Architecture, rules: TrainingRules) -> dict[str, Any]:
-    """Architecture and rules, for model.json."""
+def describe(
+    architecture: Architecture,
+    rules: TrainingRules,
+    extra: str | None = None,
+    continues: str | None = None,
+) -> dict[str, Any]:
+    """Architecture and rules, the further set learned from and the model gone on from, for model.json."""
     return {
         "architecture": architecture.as_json(),
-        "training": asdict(rules),
+        "training": asdict(rules) | {"extra": extra, "continues": continues},
         "torch": torch.__version__,
     }

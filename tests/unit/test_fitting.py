@@ -18,6 +18,7 @@ from raptor.fitting import (
     Simulator,
     Survey,
     Target,
+    correct,
     descend_by_simulation,
     deviations,
     distances,
@@ -149,6 +150,38 @@ def test_a_fit_of_nothing_measurable_is_named():
         fit(nothing, Target(None, 0.5), starts=16, seed=0)
     with pytest.raises(RaptorError, match="where the search starts"):
         descend_by_simulation(nothing, Target(None, 0.5).residuals, np.full(3, 0.5), 9)
+
+
+@pytest.mark.parametrize("budget", [1, 2, 6])
+def test_few_simulations_correct_a_surrogate_that_errs(budget):
+    """The stand-in simulator contracts more than the surrogate, and more so where both contract much."""
+    asked = []
+
+    def simulated(parameters):
+        asked.extend(parameters)
+        return smooth(parameters) ** 1.2 - 0.01
+
+    target = Target(*(smooth([TRUTH]) ** 1.2 - 0.01)[0])
+    found = minimise(smooth, target.residuals, starts=32, seed=0)
+    before = target.rss(smooth([found.parameters])[0] ** 1.2 - 0.01)
+    corrected = correct(found, smooth, simulated, target.residuals, budget=budget, enough=1e-7)
+    assert corrected.evaluations == len(asked) <= budget
+    assert corrected.rss == pytest.approx(target.rss(simulated([corrected.parameters])[0]))
+    assert corrected.rss <= before + 1e-12
+    if budget == 6:
+        assert before > 1e-4
+        assert corrected.rss < 1e-6
+        assert corrected.rank == 2
+
+
+def test_a_correction_ends_where_nothing_can_be_measured():
+    def nothing(parameters):
+        return np.full((len(parameters), 2), np.nan)
+
+    target = Target(0.7, 0.6)
+    found = minimise(smooth, target.residuals, starts=32, seed=0)
+    corrected = correct(found, smooth, nothing, target.residuals, budget=6, enough=1e-7)
+    assert (corrected.evaluations, corrected.rss) == (1, np.inf)
 
 
 @pytest.mark.parametrize("budget", [1, 4, 6, 30])
@@ -351,10 +384,11 @@ def content(tissue, delta):
     fitted = {"parameters": parameters, **ratios, "rss": 0.0, "rank": 2, "evaluations": 9}
     again = ratios | {"rss": 1e-4, "area_ratio_std": 0.0, "width_ratio_std": 0.0, "rss_std": 0.0}
     paper = parameters | ratios
+    seconds = {f"{name}_seconds": 1.0 for name in ("surrogate", "corrected", "simulator")}
     return {
         "tissue": tissue, "target": ratios, "surrogate": fitted, "simulation": again, "paper": paper,
-        "fit": fitted,
-    }  # fmt: skip
+        "fit": fitted, "corrected": fitted, "corrected_simulation": again,
+    } | seconds  # fmt: skip
 
 
 def test_tables_hold_every_fit_in_columns_of_its_own(tmp_path):

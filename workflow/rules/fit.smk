@@ -10,7 +10,7 @@ SIMULATOR = {
 
 
 rule fit_tissue:
-    """Fit the three parameters to a tissue by the surrogate; simulate it again at the fit."""
+    """Fit the three parameters to a tissue by the surrogate, correct them by a few simulations, simulate again."""
     input:
         mould=lambda wildcards: TISSUES[wildcards.tissue].mould,
         weights=SURROGATE["weights"],
@@ -35,6 +35,7 @@ rule fit_tissue:
         tissue=lambda wildcards: TISSUES[wildcards.tissue].model_dump(mode="json"),
         mould_scale=CONFIG.fit.mould_scale,
         starts=CONFIG.fit.starts,
+        corrections=CONFIG.fit.corrections,
         repeats=CONFIG.fit.repeats,
         simulator=SIMULATOR,
         configuration=CONFIG.model_fingerprint(CONFIG.chosen_model),
@@ -43,7 +44,7 @@ rule fit_tissue:
 
 
 rule fit_by_simulator:
-    """Fit a tissue by the simulator, from the surrogate's fit on, within a budget of simulations."""
+    """Fit a tissue by the simulator, from the corrected fit on, within a budget of simulations."""
     input:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,

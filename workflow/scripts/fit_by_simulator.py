@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
+from time import perf_counter
 
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
@@ -16,13 +17,19 @@ with logged(snakemake.log[0]):
     before = json.loads(Path(snakemake.input.fit).read_text())
     simulator, target = Simulator.configured(params.simulator), Target(**before["target"])
     mould = read_mould(Path(snakemake.input.mould)).scaled(before["mould_scale"])
-    start = unit_of(CellParameters(**before["surrogate"]["parameters"]))
-    measure = simulator.measure(mould)
+    start = unit_of(CellParameters(**before["corrected"]["parameters"]))
+    measure, begun = simulator.measure(mould), perf_counter()
     fitted = Fit.at(descend_by_simulation(measure, target.residuals, start, params.simulations))
+    seconds = perf_counter() - begun
     runs = [simulator.run(mould, fitted.parameters, further) for further in range(1, params.repeats + 1)]
     first = Run(0, mould.name, "test", False, fitted.parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)
     write_shard(path, [first], {0: runs[0]}, simulator.model, simulator.accuracy, params.configuration)
     again = measure_again(runs, simulator, mould, target)
-    content = {"tissue": before["tissue"], "fit": asdict(fitted), "simulation": again}
+    content = {
+        "tissue": before["tissue"],
+        "fit": asdict(fitted),
+        "simulation": again,
+        "simulator_seconds": seconds,
+    }
     write_fit(Path(snakemake.output.fit), content)

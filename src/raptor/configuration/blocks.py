@@ -223,6 +223,9 @@ class Fit(Block):
     starts: Literal[16, 32, 64, 128, 256] = Field(
         64, description="points of the Sobol sequence from which fits start"
     )
+    corrections: Positive = Field(
+        6, description="simulations by which the surrogate's fit may be corrected, one a round"
+    )
     simulations: int = Field(
         24, ge=0, description="simulations that a fit by the simulator may make; 0: no such fit"
     )

@@ -1,6 +1,7 @@
 """Fitting cell and matrix parameters to tissues: least squares, posteriors, outlines (docs/fits.md)."""
 
 from raptor.fitting.bound import simulate_at_delta
+from raptor.fitting.correcting import correct
 from raptor.fitting.further import Sampled, rank_measurements, simulate_draws
 from raptor.fitting.joint import fit_joint
 from raptor.fitting.least_squares import (
@@ -31,6 +32,7 @@ from raptor.fitting.targets import (
     surrogate_measure,
     unit_of,
 )
+from raptor.fitting.tissue import fit_tissue
 
 __all__ = [
     "CANDIDATES",
@@ -43,12 +45,14 @@ __all__ = [
     "Simulator",
     "Survey",
     "Target",
+    "correct",
     "descend",
     "descend_by_simulation",
     "deviations",
     "distances",
     "fit",
     "fit_joint",
+    "fit_tissue",
     "infer",
     "measure_again",
     "minimise",

@@ -1,17 +1,18 @@
 """A fit as a user asks for it: ratios or an outline, by the surrogate or by the simulator."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raptor.errors import RaptorError
+from raptor.fitting.correcting import correct
 from raptor.fitting.least_squares import Minimum, Residuals, minimise
 from raptor.fitting.outline import Densities, Outline, deviations, outline_measure
 from raptor.fitting.posterior import infer, summarise, survey
-from raptor.fitting.simulator import STEP, Simulator, descend_by_simulation
+from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
 from raptor.fitting.targets import (
     PARAMETERS,
     Measure,
@@ -29,6 +30,7 @@ from raptor.surrogate.inference import Surrogate
 STARTS = 128
 POINTS = 256  # of the survey behind intervals
 RATIO_ERROR, OUTLINE_ERROR = 0.01, 0.25
+CORRECTED = 4  # the part of simulations that correct the surrogate's fit is one over this
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval
 
 
@@ -135,11 +137,28 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
         found = minimise(start_by, residuals, starts=STARTS, seed=seed, fine=measure)
         if not request.by_simulator:
             return found, measure, surrogate_densities(request.surrogate, request.mould, averaged=True)
-        start = found.unit
+        return _corrected(request, found, measure)
     assert start is not None
-    measure, residuals = request.measure(request.simulated, request.simulator.measure(request.mould))
-    found = descend_by_simulation(measure, residuals, start, request.simulations)
-    return found, measure, request.simulated
+    measure, residuals = _by_simulation(request)
+    return descend_by_simulation(measure, residuals, start, request.simulations), measure, request.simulated
+
+
+def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Minimum, Measure, Densities]:
+    """The surrogate's fit corrected by simulations, and then a search by the simulator with those left."""
+    measure, residuals = _by_simulation(request)
+    budget = max(1, request.simulations // CORRECTED)
+    best = correct(found, predicted, measure, residuals, budget=budget, enough=ENOUGH)
+    left = request.simulations - best.evaluations
+    if best.rss > ENOUGH and left > 0:
+        last = descend_by_simulation(measure, residuals, best.unit, left)
+        spent = best.evaluations + last.evaluations
+        best = replace(min(best, last, key=lambda each: each.rss), evaluations=spent)
+    return best, measure, request.simulated
+
+
+def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
+    """What is measured of simulated tissues, and what the fit makes small of it."""
+    return request.measure(request.simulated, request.simulator.measure(request.mould))
 
 
 def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:

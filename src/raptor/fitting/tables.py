@@ -21,7 +21,7 @@ def write_fit(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def tabulate(fits: Sequence[dict[str, Any]], simulators: Sequence[dict[str, Any]] = ()) -> pd.DataFrame:
-    """A row a tissue: target; the surrogate's fit, simulated again; the simulator's, again; the paper's."""
+    """A row a tissue: target; each kind of fit, the simulation there, and its seconds; the paper's."""
     by_simulator = {content["tissue"]: content for content in simulators}
     return pd.DataFrame([_row(content, by_simulator.get(content["tissue"])) for content in fits])
 
@@ -45,20 +45,24 @@ def _row(content: Mapping[str, Any], simulator: Mapping[str, Any] | None) -> dic
     target, paper = Target(**content["target"]), content["paper"]
     row: dict[str, Any] = {"tissue": content["tissue"]}
     row |= {f"target_{key}": value for key, value in content["target"].items()}
-    row |= _columns("surrogate", content["surrogate"], content["simulation"])
+    row |= _columns("surrogate", content["surrogate"], content["simulation"], content)
+    row |= _columns("corrected", content["corrected"], content["corrected_simulation"], content)
     if simulator is not None:
-        row |= _columns("simulator", simulator["fit"], simulator["simulation"])
+        row |= _columns("simulator", simulator["fit"], simulator["simulation"], simulator)
     if set(RATIOS) <= paper.keys():
         row["paper_simulation_rss"] = target.rss(np.array([paper[name] for name in RATIOS]))
     return row | {f"paper_{key}": value for key, value in paper.items()}
 
 
-def _columns(name: str, fit: Mapping[str, Any], again: Mapping[str, Any]) -> dict[str, Any]:
-    """A fit's columns, and those of simulations again at its parameters."""
+def _columns(
+    name: str, fit: Mapping[str, Any], again: Mapping[str, Any], content: Mapping[str, Any]
+) -> dict[str, Any]:
+    """A fit's columns, and those of simulations again at its parameters; how long it took."""
     row = {f"{name}_{key}": value for key, value in fit["parameters"].items()}
     row |= {f"{name}_{key}": fit[key] for key in (*RATIOS, "rss")}
     row |= {f"{name}_again_{key}": again[key] for key in AGAIN}
-    return row | {f"{name}_determined": fit["rank"], f"{name}_evaluations": fit["evaluations"]}
+    row |= {f"{name}_determined": fit["rank"], f"{name}_evaluations": fit["evaluations"]}
+    return row | {f"{name}_seconds": content[f"{name}_seconds"]}
 
 
 def _mean_and_spread(name: str, fits: Sequence[Mapping[str, float]]) -> list[dict[str, Any]]:

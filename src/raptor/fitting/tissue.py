@@ -1,0 +1,57 @@
+"""A tissue fitted by the surrogate, the fit corrected by simulations, and both simulated again."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from time import perf_counter
+from typing import Any
+
+from raptor.condor.accuracy import Simulation
+from raptor.fitting.correcting import correct
+from raptor.fitting.least_squares import Fit, minimise
+from raptor.fitting.simulator import ENOUGH, Simulator, measure_again
+from raptor.fitting.targets import Target, surrogate_measure
+from raptor.moulds.geometry import Mould
+from raptor.surrogate.inference import Surrogate
+
+
+def fit_tissue(
+    surrogate: Surrogate,
+    simulator: Simulator,
+    mould: Mould,
+    target: Target,
+    *,
+    starts: int,
+    corrections: int,
+    repeats: int,
+) -> tuple[Mapping[str, Any], Simulation]:
+    """Both fits as JSON holds them, and the first simulation, with a further seed, at the surrogate's.
+
+    Parameters
+    ----------
+    starts : int
+        As `least_squares.minimise` takes it.
+    corrections : int
+        Simulations by which the fit may be corrected.
+    repeats : int
+        Simulations again, with further seeds, at each fit.
+    """
+    begun = perf_counter()
+    coarse, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
+    found = minimise(coarse, target.residuals, starts=starts, seed=simulator.seed, fine=fine)
+    fitted = perf_counter()
+    measure = simulator.measure(mould)
+    corrected = correct(found, fine, measure, target.residuals, budget=corrections, enough=ENOUGH)
+    seconds = {"surrogate_seconds": fitted - begun, "corrected_seconds": perf_counter() - fitted}
+    at_fit, at_corrected = (
+        [simulator.run(mould, each.parameters, further) for further in range(1, repeats + 1)]
+        for each in (found, corrected)
+    )
+    content = {
+        "target": asdict(target),
+        "surrogate": asdict(Fit.at(found)),
+        "simulation": measure_again(at_fit, simulator, mould, target),
+        "corrected": asdict(Fit.at(corrected)),
+        "corrected_simulation": measure_again(at_corrected, simulator, mould, target),
+        **seconds,
+    }
+    return content, at_fit[0]

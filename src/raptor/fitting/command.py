@@ -28,7 +28,7 @@ from raptor.parameters import CellParameters
 from raptor.surrogate.inference import Surrogate
 
 STARTS = 128
-POINTS = 256  # of the survey behind intervals
+POINTS = 128  # of the survey behind intervals
 RATIO_ERROR, OUTLINE_ERROR = 0.01, 0.25
 CORRECTED = 4  # the part of simulations that correct the surrogate's fit is one over this
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval

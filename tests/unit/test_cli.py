@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 import xarray as xr
 from PIL import Image
 
@@ -15,7 +16,7 @@ from raptor.condor.lattice import cast_sites
 from raptor.dataset.checks import check
 from raptor.errors import RaptorError
 from raptor.files import atomic_path
-from raptor.moulds import read_mould
+from raptor.moulds import Mould, read_mould, write_moulds
 
 ROOT = Path(__file__).parents[2]
 MOULD = str(ROOT / "config" / "moulds" / "tenocyte.geojson")
@@ -106,7 +107,10 @@ def test_every_command_teaches_by_an_example():
     [
         ((MOULD,), "give --delta, --kappa-nnn, --kappa-nnnn, or --tissue NAME"),
         ((MOULD, "--tissue", "glia_1", "--tissues", TISSUES), "did you mean 'glial_1'?"),
-        ((MOULD, "--tissue", "glial_1", "--tissues", "none.yaml"), "none.yaml cannot be read"),
+        (
+            (MOULD, "--tissue", "glial_1", "--tissues", "none.yaml"),
+            "none.yaml, in which tissues are described",
+        ),
         ((MOULD, *options(), "--picture", "a.gif"), "a.gif is no picture's name"),
         (("none.geojson", *options()), "none.geojson does not exist"),
         ((MOULD, *options(delta=1.0)), "delta is 1.0; the model allows 0 <= delta < 1"),
@@ -146,9 +150,30 @@ def test_bad_input_to_predict_and_check(tmp_path):
     assert "does not exist" in done.stderr
 
 
-def test_check_and_same(made):
+def test_no_result_takes_the_place_of_an_input(tmp_path):
+    mould = tmp_path / "mine.png"
+    before = (DOG_BONE / "dog_bone.png").read_bytes()
+    mould.write_bytes(before)
+    for command, more in (
+        ("simulate", ("--output", mould)),
+        ("predict", ("--output", tmp_path / "x.nc", "--picture", mould)),
+        ("draw", ("--output", mould)),
+    ):
+        parameters = () if command == "draw" else options()[:6]
+        done = raptor(command, mould, *parameters, *more)
+        assert done.returncode == 1
+        assert "another file of this command" in done.stderr
+        assert mould.read_bytes() == before
+
+
+def test_check_and_same(made, tmp_path):
     done = raptor("check", made)
     assert (done.returncode, done.stdout.strip()) == (0, f"{made}: no faults")
+    empty = tmp_path / "empty.geojson"
+    write_moulds(empty, [Mould(shapely.box(0.1, 0.1, 0.4, 0.4))])
+    done = raptor("check", empty)
+    assert done.returncode == 1
+    assert "holds no cell" in done.stdout
     done = raptor("same", made, made)
     assert (done.returncode, done.stdout.strip()) == (0, "the same data")
 

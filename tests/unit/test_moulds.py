@@ -103,6 +103,7 @@ def test_forbidden_depth_is_signed():
             "cover the depression",
         ),
         (SQUARE, {"tethers": [{"x": 0, "y": 0, "radius": -1}]}, "must be positive"),
+        (SQUARE, {"Tether": []}, "unknown property 'Tether'; did you mean 'tethers'"),
         (SQUARE, {"tethers": [{"x": 0, "r": 1}]}, 'must be {"x", "y", "radius"}'),
         (SQUARE, {"tethers": [{"polygon": [[0, 0], [1]]}]}, "not a list of"),
         (polygon((0, float("nan")), (5, -5), (5, 5)), {}, "finite|simple|empty"),

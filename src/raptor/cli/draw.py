@@ -37,11 +37,11 @@ def draw(
     from raptor.parameters import NetworkModel
 
     NetworkModel(layers)  # says which numbers of layers are allowed
-    require_picture_writable(output)
+    require_picture_writable(output, mould, like, geojson)
     if geojson is not None:
         if geojson.suffix not in (".geojson", ".json"):
             raise RaptorError(f"{geojson} is no GeoJSON's name; give one that ends in .geojson")
-        require_writable(geojson, "a GeoJSON file")
+        require_writable(geojson, mould, like, kind="a GeoJSON file")
     shape = read_mould(mould, scale)
     other = None if like is None else read_mould(like)
     cells = cast_sites(shape, layers)

@@ -89,8 +89,8 @@ def fit(
         start = cell_parameters(delta, kappa_nnn, kappa_nnnn).require_sampled("fit")
     target = _target(area_ratio, width_ratio, tissue, tissues, outline)
     shape = read_mould(mould, scale)
-    require_writable(output, "a JSON file")
-    require_picture_writable(picture)
+    require_writable(output, mould, outline, kind="a JSON file")
+    require_picture_writable(picture, mould, outline, output)
     surrogate = None if start is not None else load(model or SHIPPED)
     if surrogate is not None and layers not in (None, surrogate.layers):
         raise RaptorError(

@@ -46,8 +46,9 @@ def measure(
     from raptor.moulds import read_mould
 
     appearance, shape = measuring.tissue_named(look), read_mould(mould, scale)
-    for output in filter(None, (overlay, outline)):
-        require_writable(output, "a file")
+    for output, other in ((overlay, outline), (outline, overlay)):
+        if output is not None:
+            require_writable(output, image, mould, other, kind="a file")
     picture = measuring.read_picture(image)
     registration = measuring.register(picture, shape, landmarks or (), aligned, mirrored)
     measured = measuring.measure(picture, shape, registration, appearance, threshold)

@@ -63,28 +63,35 @@ def cell_parameters(
     return CellParameters(**given)
 
 
-def require_writable(output: Path, kind: str = "a netCDF file") -> None:
+def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF file") -> None:
     """Find out before the work, not after it, that a result cannot be written.
+
+    Parameters
+    ----------
+    others : sequence of Path or None
+        What the command reads, and writes besides: no result may take the place of these.
 
     Raises
     ------
     RaptorError
-        Where the path is a folder, or its folder does not exist.
+        Where the path is a folder or another file of the command, or its folder does not exist.
     """
     if output.is_dir():
         raise RaptorError(f"{output} is a folder; give the name of {kind}")
     folder = output.parent
     if not folder.is_dir():
         raise RaptorError(f"folder {folder} does not exist; create it or choose another output")
+    if any(other is not None and output.resolve() == other.resolve() for other in others):
+        raise RaptorError(f"{output} is another file of this command too; choose another name for {kind}")
 
 
-def require_picture_writable(picture: Path | None) -> None:
+def require_picture_writable(picture: Path | None, *others: Path | None) -> None:
     """As `require_writable`, for a picture, whose suffix must be one of a picture's; None is fine."""
     if picture is not None:
         from raptor.plotting import require_picture
 
         require_picture(picture)
-        require_writable(picture, "a picture")
+        require_writable(picture, *others, kind="a picture")
 
 
 def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:

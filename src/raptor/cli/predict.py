@@ -55,8 +55,8 @@ def predict(
 
     parameters = cell_parameters(delta, kappa_nnn, kappa_nnnn, tissue, tissues).require_sampled("prediction")
     shape = read_mould(mould, scale)
-    require_writable(output)
-    require_picture_writable(picture)
+    require_writable(output, mould)
+    require_picture_writable(picture, mould, output)
     cast_sites(shape, 1)  # a mould without a cell has no tissue to predict
     surrogate = load(model or SHIPPED)
     prediction = surrogate.examine(shape, parameters)

@@ -102,6 +102,11 @@ def load_tissue(path: Path, name: str) -> Tissue:
     RaptorError
         Where the file or the tissue in it cannot be used.
     """
+    if not Path(path).is_file():
+        raise RaptorError(
+            f"{path}, in which tissues are described, does not exist; go to the project's folder, or name "
+            "another file by --tissues"
+        )
     return _tissue(read_yaml(Path(path)), name, path)
 
 

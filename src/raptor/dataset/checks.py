@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from raptor.condor.energy import cell_tension, objective
+from raptor.condor.lattice import cast_sites
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS
 from raptor.dataset.design import Run, read_design
@@ -51,10 +52,8 @@ def check(path: Path, part: float = 1.0) -> list[str]:
     path = Path(path)
     if path.is_dir():
         return list(_check_folder(path, part))
-    if path.suffix == ".geojson":
-        return _fault_of(read_moulds, path)
-    if path.suffix.lower() in (".svg", ".png"):
-        return _fault_of(read_mould, path)
+    if path.suffix.lower() in (".geojson", ".svg", ".png"):
+        return _fault_of(_cast_moulds, path)
     if path.suffix == ".csv":
         return _fault_of(read_examples if path.name == "examples.csv" else read_design, path)
     if path.suffix == ".json":
@@ -69,6 +68,12 @@ def check(path: Path, part: float = 1.0) -> list[str]:
         with open_file(path) as file:
             return [*_check_variables(file, path.name), *_check_field_names(file, path.name)]
     raise RaptorError(f"{path} is neither a shard nor fields; nothing to check")
+
+
+def _cast_moulds(path: Path) -> None:
+    """Read a file's moulds, and cast two layers of each: a mould without cells is of no use."""
+    for mould in read_moulds(path) if path.suffix.lower() == ".geojson" else [read_mould(path)]:
+        cast_sites(mould, layers=2)
 
 
 def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:

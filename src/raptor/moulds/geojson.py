@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Container, Iterable
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import shapely
 from raptor.errors import RaptorError
 from raptor.files import atomic_path, read_input
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
+
+PROPERTIES = ("mould", "tethers", "symmetry", "area")
 
 
 def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
@@ -99,6 +102,7 @@ def _mould(feature: dict[str, Any], path: Path) -> Mould:
     rings = geometry.get("coordinates") or []
     if len(rings) > 1:
         raise RaptorError(f"{where}: the outline has a hole; describe what stands in it as tethers")
+    _require_known(properties, where)
     outline = _polygon(rings[0] if rings else [], f"{where}: the outline")
     tethers = tuple(
         _tether(entry, f"{where}: tether {number}")
@@ -109,6 +113,14 @@ def _mould(feature: dict[str, Any], path: Path) -> Mould:
         return Mould(outline, tethers, symmetry, name)
     except RaptorError as error:
         raise RaptorError(f"mould file {path}: {error}") from error
+
+
+def _require_known(properties: dict[str, Any], where: str) -> None:
+    """Raise a RaptorError for a mistyped property; those of other programs may stand beside ours."""
+    for key in set(properties) - set(PROPERTIES):
+        near = get_close_matches(key.lower(), PROPERTIES, 1, 0.8)
+        if near:
+            raise RaptorError(f"{where}: unknown property '{key}'; did you mean '{near[0]}'?")
 
 
 def _tether(entry: Any, what: str) -> Tether:

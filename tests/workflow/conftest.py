@@ -40,6 +40,13 @@ class Workplace:
         return set(re.findall(r"^(?:local)?rule (\w+):", done.stderr + done.stdout, re.MULTILINE))
 
 
+def pytest_collection_modifyitems(items):
+    """What looks at the tiny run is one group, so that one worker makes it, once, beside the other tests."""
+    for item in items:
+        if "finished" in item.fixturenames:
+            item.add_marker(pytest.mark.xdist_group("finished"))
+
+
 @pytest.fixture(scope="session")
 def workplace(tmp_path_factory):
     return lambda name: Workplace(tmp_path_factory.mktemp("work") / name)

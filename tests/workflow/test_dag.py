@@ -14,7 +14,7 @@ EVERYTHING = {
     "augment_dataset", "check_dataset", "write_card", "train_member", "assemble_model",
     "design_further", "enrich", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
     "evaluate_baseline", "compare_models", "summarise_evaluation", "plot_calibration", "plot_regions",
-    "plot_worst", "plot_models", "ship",
+    "plot_worst", "plot_models", "plot_enrichment", "ship",
     "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "simulate_unmeasured",
     "plot_valley", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
     "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",

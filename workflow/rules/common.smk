@@ -31,6 +31,7 @@ config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
 RESULTS = f"results/{CONFIG.name}"
 CASES = {case.name: case for case in CONFIG.tradeoff.cases}
 MODELS = CONFIG.models
+ENRICHED = [name for name, model in MODELS.items() if model.extra]
 SETS = CONFIG.further_sets
 SWEEPS = CONFIG.sweep.files()
 JUDGED = ["test", *(name for name in ("bars", "slender", "corner") if name in SETS)]
@@ -44,6 +45,7 @@ FIGURES = (
     "worst",
     "models",
     "tradeoff",
+    *(["enrichment"] if ENRICHED else []),
 )
 
 

@@ -196,6 +196,31 @@ rule plot_models:
         "../scripts/plot_models.py"
 
 
+rule plot_enrichment:
+    """What further simulations were worth in training: errors by region, before and after."""
+    input:
+        regions=rules.compare_models.output.regions,
+    output:
+        png=report(
+            f"{RESULTS}/figures/enrichment.png",
+            caption="../report/plot_enrichment.rst",
+            category="Surrogate",
+        ),
+        svg=f"{RESULTS}/figures/enrichment.svg",
+        data=f"{RESULTS}/figures/enrichment.csv",
+    log:
+        f"{RESULTS}/logs/plot_enrichment.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_enrichment.tsv"
+    threads: 1
+    resources:
+        mem_mb=800,
+    params:
+        models=[CONFIG.surrogate.model, *ENRICHED],
+    script:
+        "../scripts/plot_enrichment.py"
+
+
 rule plot_tradeoff:
     """Error against cost, by method."""
     input:

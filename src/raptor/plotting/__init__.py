@@ -18,6 +18,7 @@ from raptor.plotting.drawing import (
 from raptor.plotting.fits import fit_figure, valley_figure
 from raptor.plotting.judging import (
     calibration_figure,
+    enrichment_figure,
     models_figure,
     regions_figure,
     training_figure,
@@ -32,6 +33,7 @@ __all__ = [
     "design_figure",
     "directors_figure",
     "draw_mould",
+    "enrichment_figure",
     "fields_figure",
     "fit_figure",
     "folding_figure",

@@ -23,7 +23,9 @@ from raptor.plotting.drawing import (
 from raptor.symmetry import FIELDS
 
 SHAPE_LABELS = {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
-COLOURS = ("#33508a", "#d98c21", "#3c8a5a", "#8a3355", "#6b6b6b", "#5aa9c9", "#b8860b")
+COLOURS = (
+    "#33508a", "#d98c21", "#3c8a5a", "#8a3355", "#6b6b6b", "#5aa9c9", "#b8860b", "#c39bd3", "#000000",
+)  # fmt: skip
 
 
 @STYLED
@@ -114,6 +116,29 @@ def regions_figure(metrics: pd.DataFrame, regions: pd.DataFrame) -> Figure:
     shapes.set_yticks([])
     shapes.set(xlabel="mean absolute error")
     shapes.legend(frameon=False, fontsize=7)
+    return figure
+
+
+@STYLED
+def enrichment_figure(regions: pd.DataFrame) -> Figure:
+    """Errors by region of models trained without and with further simulations, a bar a model."""
+    figure = new_figure(12.0, 4.6)
+    panels = figure.subplots(1, 3, sharey=True)
+    models = list(dict.fromkeys(regions["model"]))
+    names = list(dict.fromkeys(regions["region"]))
+    height = 0.8 / len(models)
+    measures = {"vrmse_density": "VRMSE of density"} | {
+        f"{name}_mae": f"mean absolute error of {label}" for name, label in SHAPE_LABELS.items()
+    }
+    for axes, (column, label) in zip(panels, measures.items(), strict=True):
+        for number, (model, colour) in enumerate(zip(models, COLOURS, strict=False)):
+            table = regions[regions["model"] == model].set_index("region").reindex(names)
+            places = np.arange(len(names)) - 0.4 + height * (number + 0.5)
+            axes.barh(places, table[column], 0.95 * height, color=colour, label=model)
+        axes.set(xlabel=label)
+    panels[0].set_yticks(range(len(names)), names, fontsize=7)
+    panels[0].invert_yaxis()
+    panels[0].legend(frameon=False, fontsize=7)
     return figure
 
 

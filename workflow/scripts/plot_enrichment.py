@@ -1,0 +1,16 @@
+"""Draw errors by region of the models trained with and without further simulations."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.files import atomic_path
+from raptor.jobs import logged
+from raptor.plotting import enrichment_figure, save
+
+with logged(snakemake.log[0]):
+    table = pd.read_csv(snakemake.input.regions)
+    table = table[table["model"].isin(snakemake.params.models) & (table["samples"] > 0)]
+    save(enrichment_figure(table), Path(snakemake.output.png).with_suffix(""))
+    with atomic_path(Path(snakemake.output.data)) as path:
+        table.to_csv(path, index=False)

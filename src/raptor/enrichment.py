@@ -33,7 +33,7 @@ def enriched(
     disagreements = []
     for run, mould in zip(runs, moulds, strict=True):
         image, cells = mould_image(mould, surrogate.pixels), len(cast_sites(mould, surrogate.layers))
-        fields, spread, _ = surrogate.ensemble(image, mould, run.parameters, cells)
+        fields, spread, _ = surrogate.ensemble(image, run.parameters, cells)
         disagreements.append(relative_spread(spread, fields))
         done(run.simulation)
     chosen = np.sort(np.argsort(disagreements)[::-1][:size])

@@ -121,6 +121,7 @@ def evaluate(
             measured = sample_measures(fields, sample, mould, layers)
             row |= {f"{name}_{source}": value for name, value in measured.items()}
         if isinstance(guess, Prediction):
+            row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.shape, strict=True)}
             row |= _coverage(guess, sample, row)
         rows.append(row)
         done(sample.simulation)

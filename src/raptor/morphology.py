@@ -26,6 +26,13 @@ def area_ratio(density: NDArray[np.floating], image: MouldImage, threshold: floa
     return float(np.count_nonzero(density > threshold) / np.count_nonzero(image.depression))
 
 
+def ratios_above(
+    density: NDArray[np.floating], image: MouldImage, mould: Mould, threshold: float
+) -> NDArray[np.float64]:
+    """A/A0 and w/w0, (2,), of the tissue where density (y, x) is above a threshold."""
+    return np.array([area_ratio(density, image, threshold), width_ratio(density, mould, threshold)])
+
+
 def shape_ratios(density: NDArray[np.floating], mould: Mould, layers: int) -> tuple[float, float]:
     """A/A0 and w/w0 of a tissue of so many layers from its density (y, x) in its mould.
 
@@ -35,9 +42,8 @@ def shape_ratios(density: NDArray[np.floating], mould: Mould, layers: int) -> tu
         Where the depression covers no pixel.
     """
     pixels = density.shape[-1]
-    threshold = density_threshold(layers, pixels)
-    area = area_ratio(density, mould_image(mould, pixels), threshold)
-    return area, width_ratio(density, mould, threshold)
+    area, width = ratios_above(density, mould_image(mould, pixels), mould, density_threshold(layers, pixels))
+    return float(area), float(width)
 
 
 def central_section(mould: Mould) -> shapely.LineString:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from raptor.condor.accuracy import Simulation, simulate
 from raptor.fields import rasterise
-from raptor.morphology import area_ratio, density_threshold, width_ratio
+from raptor.morphology import shape_ratios
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters, NetworkModel
@@ -96,12 +96,7 @@ class Case:
 
     def shape(self, fields: NDArray[np.floating]) -> NDArray[np.float64]:
         """A/A0 and w/w0 of fields (8, y, x), of any raster."""
-        pixels = fields.shape[-1]
-        threshold = density_threshold(self.model.layers, pixels)
-        image = mould_image(self.mould, pixels)
-        return np.array(
-            [area_ratio(fields[0], image, threshold), width_ratio(fields[0], self.mould, threshold)]
-        )
+        return np.array(shape_ratios(fields[0], self.mould, self.model.layers))
 
 
 @dataclass(frozen=True)
@@ -171,7 +166,10 @@ def compare(
     rows += _other_rasters(case, reference, comparison.pixels, done)
     if surrogate is not None:
         predicted, seconds = _timed(partial(surrogate.predict_mould, case.mould, case.parameters))
-        rows.append(_row(case, reference, "surrogate", predicted, seconds))
+        shape = surrogate.shape(predicted[0], mould_image(case.mould, case.pixels), case.mould)
+        row = _row(case, reference, "surrogate", predicted, seconds)
+        row["area_error"], row["width_error"] = reference.shape_error(shape)
+        rows.append(row)
     spread = {"density_spread": reference.spread[0], "area_spread": shapes[:, 0].std(ddof=1)}
     spread["width_spread"] = shapes[:, 1].std(ddof=1)
     table = pd.DataFrame(rows).assign(**spread)

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import shapely
 import torch
+from scipy.ndimage import gaussian_filter
 
 from raptor.baselines import Nearest, baseline, training_mean
 from raptor.dataset.design import Run, read_design, write_design
@@ -18,8 +20,10 @@ from raptor.dataset.stack import build_stack, read_samples, read_table
 from raptor.enrichment import enriched
 from raptor.errors import RaptorError
 from raptor.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
-from raptor.moulds import moulds_by_id
-from raptor.surrogate.calibrating import calibrate
+from raptor.morphology import density_threshold, ratios_above
+from raptor.moulds import Mould, moulds_by_id
+from raptor.moulds.raster import mould_image, pixel_centres
+from raptor.surrogate.calibrating import Silhouette, calibrate, fit_edge
 from raptor.surrogate.calibration import LEVELS, Bands, fit_scale
 from raptor.surrogate.costs import costs_of
 from raptor.surrogate.files import load, save, write_prediction
@@ -93,6 +97,26 @@ def test_what_is_far_from_all_points_is_novel():
     assert novelty.distance(np.full(9, 6.0)) > 3
 
 
+def test_the_edge_of_softer_images_is_found():
+    """Blurred tissues that fill less and less of a mould, at a threshold below half of their density."""
+    mould = Mould(shapely.box(-20, -10, 20, 10))
+    image = mould_image(mould, 128)
+    x, y = np.meshgrid(pixel_centres(128), pixel_centres(128))
+    silhouettes = []
+    for part in (0.5, 0.6, 0.7, 0.8):
+        sharp = 1 / (1 + np.exp(4 * np.maximum(np.abs(x) - 20 * part, np.abs(y) - 10 * part)))
+        soft = gaussian_filter(sharp, 3.0)
+        true = ratios_above(sharp, image, mould, 0.3)
+        silhouettes.append(Silhouette(image, mould, true, soft, soft[None]))
+    edge = fit_edge(silhouettes, 0.3)
+    assert edge > 1.02
+    before, after = (np.mean([np.abs(s.error(e * 0.3)) for s in silhouettes]) for e in (1.0, edge))
+    assert after < 0.5 * before
+    assert silhouettes[0].errors(0.3).shape == (3, 2)
+    same = [replace(s, true=ratios_above(s.predicted, image, mould, 0.3)) for s in silhouettes]
+    assert fit_edge(same, 0.3) == pytest.approx(1, abs=5e-3)
+
+
 def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogate, moulds, stack, tmp_path):
     (sample,) = read_samples(stack, read_table(stack).rows("test")[:1])
     mould = moulds[sample.mould]
@@ -111,6 +135,8 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
         assert np.abs(again.fields - prediction.fields).max() < near * np.abs(prediction.fields).max()
         assert again.shape_bands.half == pytest.approx(prediction.shape_bands.half, rel=0.05)
         assert again.distance == pytest.approx(prediction.distance)
+        assert again.threshold == pytest.approx(prediction.threshold)
+    assert prediction.threshold != pytest.approx(density_threshold(2, 32), rel=1e-3)
     write_prediction(tmp_path / "p.nc", prediction, mould, sample.parameters)
     with pytest.raises(RaptorError, match="not calibrated"):
         replace(surrogate, calibration=None).examine(mould, sample.parameters)

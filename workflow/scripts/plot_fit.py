@@ -31,7 +31,8 @@ with logged(snakemake.log[0]):
         (other,) = read_shard(tissue).records
         stacks["fit by simulator"] = record_fields(other, pixels)
         rows.append({"source": "fit by simulator", **json.loads(path.read_text())["simulation"]})
-    threshold = density_threshold(surrogate.layers, pixels)
+    thresholds = dict.fromkeys(stacks, density_threshold(surrogate.layers, pixels))
+    thresholds["prediction"] = surrogate.threshold
     densities = {name: stack[0] for name, stack in stacks.items()}
-    save(fit_figure(mould, densities, threshold, rows), Path(snakemake.output.png).with_suffix(""))
+    save(fit_figure(mould, densities, thresholds, rows), Path(snakemake.output.png).with_suffix(""))
     save_fields(Path(snakemake.output.data), stacks)

@@ -106,7 +106,7 @@ def fit(
         from raptor.plotting import fit_figure, save_picture
 
         rows = [{"source": "measured", **content["target"]}, {"source": by, **content["fit"]}]
-        save_picture(fit_figure(shape, {by: density}, request.threshold, rows), picture)
+        save_picture(fit_figure(shape, {by: density}, {by: request.threshold}, rows), picture)
     report(_sentence(output, content), _numbers(content) | {"output": output, "picture": picture}, as_json)
 
 

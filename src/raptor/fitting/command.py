@@ -22,8 +22,9 @@ from raptor.fitting.targets import (
     surrogate_measure,
     unit_of,
 )
-from raptor.morphology import density_threshold, shape_ratios
+from raptor.morphology import density_threshold, ratios_above
 from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters
 from raptor.surrogate.inference import Surrogate
 
@@ -66,13 +67,15 @@ class Request:
 
     @property
     def threshold(self) -> float:
-        """Density per pixel above which there is tissue."""
+        """Density per pixel above which there is tissue, as what the fit ends with gives densities."""
+        if self.surrogate is not None and not self.by_simulator:
+            return self.surrogate.threshold
         return density_threshold(self.simulator.model.layers, self.simulator.pixels)
 
-    def measure(self, densities: Densities, ratios: Measure) -> tuple[Measure, Residuals]:
+    def measure(self, densities: Densities, ratios: Measure, threshold: float) -> tuple[Measure, Residuals]:
         """What is measured of tissues, and what the fit makes small of it."""
         if isinstance(self.target, Outline):
-            return outline_measure(densities, self.target, self.threshold), np.asarray
+            return outline_measure(densities, self.target, threshold), np.asarray
         return ratios, self.target.residuals
 
     def simulated(self, parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
@@ -94,7 +97,8 @@ def fit_for(request: Request) -> tuple[dict[str, Any], NDArray[np.floating]]:
     """
     found, measure, densities = _search(request)
     density = densities([found.parameters])[0]
-    area, width = shape_ratios(density, request.mould, request.simulator.model.layers)
+    image = mould_image(request.mould, request.simulator.pixels)
+    area, width = map(float, ratios_above(density, image, request.mould, request.threshold))
     fitted = {
         "parameters": asdict(found.parameters),
         "area_ratio": area,
@@ -130,6 +134,7 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
             request.measure(
                 surrogate_densities(request.surrogate, request.mould, averaged=averaged),
                 surrogate_measure(request.surrogate, request.mould, averaged=averaged),
+                request.surrogate.threshold,
             )
             for averaged in (False, True)
         )
@@ -158,7 +163,7 @@ def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Mi
 
 def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
     """What is measured of simulated tissues, and what the fit makes small of it."""
-    return request.measure(request.simulated, request.simulator.measure(request.mould))
+    return request.measure(request.simulated, request.simulator.measure(request.mould), request.threshold)
 
 
 def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:

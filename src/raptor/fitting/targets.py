@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.condor.lattice import cast_sites
-from raptor.morphology import area_ratio, density_threshold, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import (
@@ -91,16 +90,10 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
 def surrogate_measure(surrogate: Surrogate, mould: Mould, *, averaged: bool = False) -> Measure:
     """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
     image = mould_image(mould, surrogate.pixels)
-    threshold = density_threshold(surrogate.layers, surrogate.pixels)
     densities_of = surrogate_densities(surrogate, mould, averaged=averaged)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-        return np.array(
-            [
-                (area_ratio(density, image, threshold), width_ratio(density, mould, threshold))
-                for density in densities_of(parameters)
-            ]
-        )
+        return np.array([surrogate.shape(density, image, mould) for density in densities_of(parameters)])
 
     return measure
 

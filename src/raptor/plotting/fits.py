@@ -36,17 +36,19 @@ LIMIT = -chi2.ppf(0.95, 1) / 2  # of a log profile likelihood, where the 95 % in
 def fit_figure(
     mould: Mould,
     densities: Mapping[str, NDArray[np.floating]],
-    threshold: float,
+    thresholds: Mapping[str, float],
     rows: Sequence[Mapping[str, Any]],
 ) -> Figure:
-    """Densities (y, x) of a fitted tissue in its mould, its outline, and the ratios beside the target."""
+    """Densities (y, x) of a fitted tissue in its mould, outlined at thresholds; ratios beside the target."""
     figure = new_figure(3.5 * (len(densities) + 1), 3.4)
     panels = figure.subplots(1, len(densities) + 1)
     limit = max(float(density.max()) for density in densities.values())
     for axes, (name, density) in zip(panels, densities.items(), strict=False):
         shown = show_field(axes, density, "density", limit)
         frame = (-HALF, HALF, -HALF, HALF)
-        axes.contour(density, [threshold], origin="lower", extent=frame, colors="white", linewidths=0.8)
+        axes.contour(
+            density, [thresholds[name]], origin="lower", extent=frame, colors="white", linewidths=0.8
+        )
         draw_mould(axes, mould, fill=False)
         axes.set_title(name)
     figure.colorbar(shown, ax=panels[:-1], shrink=0.8, label="density per pixel")

@@ -66,12 +66,16 @@ class Calibration:
         Of networks about density (`relative_spread`), that all but a hundredth of samples stay below.
     novelty : Novelty
         Distance to the training set.
+    edge : float
+        Where a tissue ends in predicted densities, over where it ends in simulated ones: predicted edges are
+        softer, so that the same threshold lies farther out.
     """
 
     fields: Scale
     shapes: Scale
     disagreement: float
     novelty: Novelty
+    edge: float = 1.0
 
     def disagreement_of(self, spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
         """Disagreement of networks about density over what is usual."""
@@ -85,6 +89,7 @@ class Calibration:
             "shapes": {"floor": self.shapes.floor, "factors": self.shapes.factors},
             "disagreement": self.disagreement,
             "distance": self.novelty.usual,
+            "edge": self.edge,
         }
 
     @classmethod
@@ -94,7 +99,8 @@ class Calibration:
             Scale(tuple(part["floor"]), tuple(tuple(row) for row in part["factors"]))
             for part in (content["fields"], content["shapes"])
         )
-        return cls(fields, shapes, content["disagreement"], Novelty(points, content["distance"]))
+        novelty = Novelty(points, content["distance"])
+        return cls(fields, shapes, content["disagreement"], novelty, content.get("edge", 1.0))
 
 
 def relative_spread(spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:

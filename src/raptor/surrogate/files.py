@@ -140,6 +140,7 @@ def write_prediction(path: Path, prediction: Prediction, mould: Mould, parameter
     pixels = prediction.fields.shape[-1]
     with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
         file.mould = mould.name
+        file.threshold = prediction.threshold  # density per pixel above which there is tissue in these fields
         sizes = {"sample": 1, "level": len(LEVELS), "field": len(FIELDS), "y": pixels, "x": pixels}
         for name, size in sizes.items():
             file.createDimension(name, size)

@@ -14,7 +14,7 @@ from torch.nn.functional import interpolate
 from raptor.condor.lattice import cast_sites
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.errors import RaptorError
-from raptor.morphology import area_ratio, density_threshold, width_ratio
+from raptor.morphology import density_threshold, ratios_above
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import MouldImage, mould_image
 from raptor.parameters import CellParameters
@@ -46,6 +46,8 @@ class Prediction:
     disagreement, distance : float
         How far the networks disagree, and how far the input is from the training set, both over what all but
         a hundredth of the validation samples stay below.
+    threshold : float
+        Density per pixel above which there is tissue in these fields.
     """
 
     fields: NDArray[np.float32]
@@ -54,6 +56,7 @@ class Prediction:
     shape_bands: Bands
     disagreement: float
     distance: float
+    threshold: float
 
     @property
     def unlike(self) -> bool:
@@ -84,8 +87,9 @@ class Surrogate:
 
     @cached_property
     def threshold(self) -> float:
-        """Density per pixel above which there is tissue."""
-        return density_threshold(self.layers, self.pixels)
+        """Predicted density per pixel above which there is tissue: the simulated one's, calibrated."""
+        edge = 1.0 if self.calibration is None else self.calibration.edge
+        return edge * density_threshold(self.layers, self.pixels)
 
     @property
     def weights(self) -> int:
@@ -153,22 +157,24 @@ class Surrogate:
                 "use the model that the workflow's rule assemble_model wrote"
             )
         image, cells = mould_image(mould, self.pixels), len(cast_sites(mould, self.layers))
-        fields, spread, shapes = self.ensemble(image, mould, parameters, cells)
+        fields, spread, of_members = self.ensemble(image, parameters, cells)
+        shapes = np.array([self.shape(density, image, mould) for density in of_members])
         calibration = self.calibration
         seen = descriptors(image.depression, image.tethers, parameters)
         return Prediction(
             fields,
-            self.shape(fields, image, mould),
+            self.shape(fields[0], image, mould),
             calibration.fields.bands(spread, np.abs(fields[:1])),
             calibration.shapes.bands(deviation(shapes), np.ones(2)),
             calibration.disagreement_of(spread, fields),
             calibration.novelty.distance(seen),
+            self.threshold,
         )
 
     def ensemble(
-        self, image: MouldImage, mould: Mould, parameters: CellParameters, cells: int
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]:
-        """Mean fields (8, y, x), their spread over members and images, and members' shapes (n, 2)."""
+        self, image: MouldImage, parameters: CellParameters, cells: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """Mean fields (8, y, x), their spread over members and images, and members' densities (n, y, x)."""
         masks = self._masks(image.depression, image.tethers, [parameters])
         images = self._images(masks, [parameters], cells, averaged=True)[0]
         of_members = images.reshape(len(self.members), -1, *images.shape[1:])
@@ -176,15 +182,11 @@ class Surrogate:
         fine = self._fine(means, masks, cells).numpy()
         spread = unsigned(images).std(dim=0, correction=1)
         wide = interpolate(spread[None], size=2 * (self.pixels,), mode="bilinear")[0].numpy()
-        return fine[0], wide, np.array([self.shape(fields, image, mould) for fields in fine[1:]])
+        return fine[0], wide, fine[1:, 0]
 
-    def shape(self, fields: NDArray[np.floating], image: MouldImage, mould: Mould) -> NDArray[np.float64]:
-        """A/A0 and w/w0 of fields (8, y, x), (2,)."""
-        ratios = (
-            area_ratio(fields[0], image, self.threshold),
-            width_ratio(fields[0], mould, self.threshold),
-        )
-        return np.array(ratios)
+    def shape(self, density: NDArray[np.floating], image: MouldImage, mould: Mould) -> NDArray[np.float64]:
+        """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
+        return ratios_above(density, image, mould, self.threshold)
 
     def _masks(
         self, depression: NDArray[Any], tethers: NDArray[Any], parameters: Sequence[CellParameters]

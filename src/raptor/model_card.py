@@ -40,7 +40,8 @@ from seed to seed of the simulator itself, where 1 is the best that any predicti
 | --- | --- | --- | --- | --- |
 {measures}
 
-Mean P is right by construction. A/A0 and w/w0: mean absolute errors {area:.4f} and {width:.4f}.
+Mean P is right by construction. A/A0 and w/w0: mean absolute errors {area:.4f} and {width:.4f}, tissue being
+where predicted density is above {edge:.3f} times the simulator's threshold.
 
 ## Bands
 Calibrated on the validation split; share of the held-out simulations that they hold:
@@ -118,6 +119,7 @@ def model_card(
             ]
             for m in MEASURES
         ),
+        edge=1.0 if surrogate.calibration is None else surrogate.calibration.edge,
         area=bulk["area_ratio"]["mae"],
         width=bulk["width_ratio"]["mae"],
         levels=" | ".join(f"{100 * level:.0f} %" for level in LEVELS),

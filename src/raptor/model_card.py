@@ -24,9 +24,9 @@ tensor is positive with density as its trace.
 **Data.** The data set `{data}` (docs/card_paper.md): {test} simulations held out, none of whose
 moulds was seen in training. Model version of the simulator {model_version}; RAPTOR {version}.
 
-**Training.** {epochs} passes over the augmented training split{continued}, batches of {batch}, Adam
-at {rate}, {precision} layers, loss `{loss}`; {minutes:.0f} processor minutes for all members. Weights
-are those of the epoch with the least validation error{stored}.
+**Training.** {epochs} passes over the augmented training split{continued}.
+Batches of {batch}, Adam at {rate}, {precision} layers, loss `{loss}`; {minutes:.0f} processor minutes for
+all members. Weights are those of the epoch with the least validation error{stored}.
 
 ## Errors on the held-out simulations
 VRMSE: root mean square error over the simulation's standard deviation. In floors: over the noise
@@ -64,6 +64,11 @@ with conventional signs.
 
 Reference: {references}.
 """
+
+EXTRA = {
+    "random": "\nand further simulations drawn at random",
+    "enriched": "\nand further simulations where its networks disagreed most",
+}
 
 
 def model_card(
@@ -145,15 +150,14 @@ def model_card(
 
 
 def _continued(training: Mapping[str, Any]) -> str:
-    """How a training went on from another model's, in words."""
-    further = {
-        None: "",
-        "random": " with further simulations drawn at random",
-        "enriched": " with further simulations where its networks disagreed most",
-    }[training.get("extra")]
-    if training.get("continues") is None:
-        return further
-    return f", the last {training['epochs']} from the weights of `{training['continues']}`{further}"
+    """On what else, and from what, a training went on, in words."""
+    further = EXTRA.get(training.get("extra") or "", "")
+    begun = training.get("continues")
+    return (
+        further
+        if begun is None
+        else f"{further}, the last {training['epochs']} from the weights of `{begun}`"
+    )
 
 
 def _maybe(value: float | None, digits: int = 2) -> str:

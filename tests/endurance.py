@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from raptor.dataset.same import differences
+from raptor.dataset.compare import differences
 from raptor.dataset.shards import shard_paths
 from tests.small import ROOT
 

@@ -15,8 +15,8 @@ from matplotlib.patches import Polygon
 from scipy.ndimage import gaussian_filter
 from skimage import io
 
-from raptor.measuring import Registration, as_picture, measure, register
-from raptor.morphology import outline_ratios
+from raptor.fields.shape import outline_ratios
+from raptor.imaging import Registration, as_picture, measure, register
 from raptor.moulds import read_mould
 
 MOULDS = Path(__file__).parents[1] / "config" / "moulds"

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from raptor.configuration import Configuration
+from raptor.config import Configuration
 from raptor.dataset.design import sample_design, write_design
 from raptor.dataset.examples import augment, training_scaling, write_examples
+from raptor.dataset.run import simulate_shard
 from raptor.dataset.scaling import write_scaling
 from raptor.dataset.shards import write_shard
-from raptor.dataset.simulating import simulate_shard
 from raptor.dataset.stack import build_stack
 from raptor.moulds import write_moulds
 

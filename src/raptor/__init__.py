@@ -8,12 +8,6 @@ Source of the methods: A. E. Andrews et al., "Rapid prediction of organisation i
 corneal, glial and fibroblast tissues using machine learning and biophysical models" (2025).
 """
 
-from importlib.metadata import version
+from raptor.core.version import MODEL_VERSION, __version__
 
-__version__ = version("raptor-tissue")
-
-MODEL_VERSION = 2
-"""Raised whenever a change of code changes results: it travels in rule parameters and in files."""
-
-STACK_FORMAT = 2
-"""Raised whenever field stacks are laid out otherwise: they are then built again, from the same shards."""
+__all__ = ["MODEL_VERSION", "__version__"]

@@ -7,7 +7,7 @@ dimensionless.
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 SHELL_DISTANCE = {1: 1.0, 2: sqrt(2.0), 3: sqrt(3.0), 4: 2.0}
 """Distance of the neighbour shells of the face-centred-cubic lattice, in l0."""

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from raptor.condor.energy import CONTACT_LENGTH, cell_tension, folded_fraction, objective
+from raptor.condor.energy import CONTACT_LENGTH, cell_tension, inverted_fraction, objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS, STIFFNESS, build_walls
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 from raptor.parameters import CellParameters, NetworkModel
 from tests import naive
 
@@ -121,11 +121,11 @@ def test_soft_bonds_are_not_built(small_mould):
 
 def test_folding_is_counted(lattice):
     state = np.concatenate([lattice.sites.T.ravel(), np.ones(3 * lattice.cells)])
-    assert folded_fraction(state, lattice) == 0
+    assert inverted_fraction(state, lattice) == 0
     state[: lattice.cells] *= -1  # mirrored in x: bonds along x reverse
-    assert 0 < folded_fraction(state, lattice) < 1
+    assert 0 < inverted_fraction(state, lattice) < 1
     state[: 3 * lattice.cells] = -lattice.sites.T.ravel()
-    assert folded_fraction(state, lattice) == 1
+    assert inverted_fraction(state, lattice) == 1
 
 
 def test_a_state_of_the_wrong_size_is_named(network, walls, random_state):

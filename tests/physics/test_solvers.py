@@ -3,7 +3,6 @@ import pytest
 import shapely
 
 from raptor.condor import Accuracy, accuracy_named, annealed, simulate
-from raptor.condor.accuracy import ACCURACIES
 from raptor.condor.anneal import anneal
 from raptor.condor.contract import (
     CONTACT,
@@ -19,9 +18,10 @@ from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.minimise import minimise
 from raptor.condor.network import build_network, build_sublattices
+from raptor.condor.simulate import ACCURACIES
 from raptor.condor.system import build_system, cast_state
 from raptor.condor.walls import NO_WALLS, build_walls
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 from raptor.moulds import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.symmetry import Element
@@ -35,7 +35,7 @@ MIDDLE = CellParameters(0.5, 0.5, 0.3)
 def assert_sound(tissue):
     for array in (tissue.positions, tissue.orientation, tissue.tension):
         assert np.isfinite(array).all()
-    assert np.isfinite([tissue.energy, tissue.wall_energy, tissue.folded_fraction]).all()
+    assert np.isfinite([tissue.energy, tissue.wall_energy, tissue.inverted_fraction]).all()
     assert np.linalg.norm(tissue.orientation, axis=1) == pytest.approx(1)
 
 
@@ -44,7 +44,7 @@ def test_every_level_converges_on_an_easy_mould_and_says_so(accuracy):
     tissue = simulate(POSTED, MIDDLE, NetworkModel(2), accuracy, 1)
     assert_sound(tissue)
     assert tissue.converged
-    assert accuracy == "draft" or tissue.folded_fraction == 0
+    assert accuracy == "draft" or tissue.inverted_fraction == 0
     assert POSTED.forbidden_depth(tissue.positions[:, :2]).max() < 0.1
 
 
@@ -59,7 +59,7 @@ def test_more_accurate_levels_end_lower():
 def test_the_soft_corner_does_not_fold_at_standard():
     tissue = simulate(POSTED, SOFT, NetworkModel(3), "standard", 1)
     assert_sound(tissue)
-    assert tissue.folded_fraction == 0
+    assert tissue.inverted_fraction == 0
 
 
 @pytest.mark.parametrize("layers", [1, 2, 3])
@@ -70,7 +70,7 @@ def test_corners_and_edges_of_the_parameters(delta, kappas, layers):
     parameters, model = CellParameters(delta, *kappas), NetworkModel(layers)
     tissue = simulate(POSTED, parameters, model, "standard", 2)
     assert_sound(tissue)
-    assert tissue.folded_fraction == 0
+    assert tissue.inverted_fraction == 0
     assert tissue.converged
     system = build_system(POSTED, parameters, model)
     cast = cast_state(system.lattice.sites, np.random.default_rng(2))
@@ -127,7 +127,7 @@ def test_single_precision_agrees_within_the_spread_of_seeds():
         found = {}
         for accuracy in ("standard", "standard-float32"):
             tissues = [simulate(POSTED, parameters, NetworkModel(2), accuracy, seed) for seed in range(8)]
-            assert all(t.converged and t.folded_fraction == 0 for t in tissues)
+            assert all(t.converged and t.inverted_fraction == 0 for t in tissues)
             found[accuracy] = np.array([[*t.positions.std(axis=0), t.energy] for t in tissues])
         double, single = found.values()
         spread = np.sqrt((double.var(axis=0, ddof=1) + single.var(axis=0, ddof=1)) / len(double))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from raptor.compiled import kernel
 from raptor.condor.anneal import DRAWS, _circle_kernel, _propose_kernel, _uniform_kernel
-from raptor.condor.lanes import lanes, load, store
+from raptor.condor.simd import lanes, load, store
+from raptor.core.compiled import kernel
 
 WIDTH = lanes(np.float64)
 

@@ -7,14 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+from benchmarks.baselines import gradient_by_bonds, gradient_by_neighbours, neighbour_table, torch_gradient
+from benchmarks.solvers import elastic_stiffness
 
-from raptor.benchmark.baselines import (
-    gradient_by_bonds,
-    gradient_by_neighbours,
-    neighbour_table,
-    torch_gradient,
-)
-from raptor.benchmark.solvers import elastic_stiffness
 from raptor.condor.energy import objective, unit_orientations
 from raptor.condor.network import build_network
 from raptor.condor.system import build_system
@@ -56,7 +51,7 @@ def test_elastic_stiffness_is_the_curvature_without_contraction(small_mould, par
 
 
 def test_the_benchmark_prints_its_tables():
-    command = [sys.executable, "-m", "raptor.benchmark", "--quick"]
+    command = [sys.executable, "-m", "benchmarks", "--quick"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     for title in ("Gradient", "bounds", "Trial moves", "preconditioners", "Whole runs", "to the power"):
@@ -66,7 +61,7 @@ def test_the_benchmark_prints_its_tables():
 def test_the_gpu_script_runs_whole_on_a_processor(tmp_path):
     output = tmp_path / "gpu.json"
     command = [
-        sys.executable, "-m", "raptor.benchmark.gpu", str(ROOT / "tests/workflow/config/tiny.yaml"),
+        sys.executable, "-m", "benchmarks.gpu", str(ROOT / "tests/workflow/config/tiny.yaml"),
         "--output", str(output), "--device", "cpu", "--simulations", "2", "--checked", "2", "--channels", "2",
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"}

@@ -13,9 +13,9 @@ from PIL import Image
 
 from raptor.cli import COMMANDS
 from raptor.condor.lattice import cast_sites
-from raptor.dataset.checks import check
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.dataset.check import check
 from raptor.moulds import Mould, read_mould, write_moulds
 
 ROOT = Path(__file__).parents[2]
@@ -206,10 +206,10 @@ def test_a_failed_writer_leaves_what_was_there(tmp_path):
 def untrained(folder):
     """A calibrated surrogate that has learnt nothing."""
     from raptor.dataset.scaling import Scaling
-    from raptor.surrogate.calibration import Calibration, Scale
+    from raptor.surrogate.bands import Calibration, Scale
     from raptor.surrogate.files import save
     from raptor.surrogate.networks import Architecture, Generator, initialise
-    from raptor.surrogate.novelty import DESCRIPTORS, Novelty
+    from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty
 
     architecture, scaling = Architecture(32, 4), Scaling((0.5,) * 8, (0.5,) * 8)
     weights = [initialise(Generator(architecture, scaling)).state_dict() for _ in range(2)]
@@ -237,8 +237,8 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path):
 def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
     """The tissue that is fitted is one of the simulator's own, a little off the start."""
     from raptor.condor import simulate
-    from raptor.fields import rasterise
-    from raptor.morphology import density_threshold, shape_ratios
+    from raptor.fields.raster import rasterise
+    from raptor.fields.shape import density_threshold, shape_ratios
     from raptor.parameters import CellParameters, NetworkModel
 
     mould = read_mould(Path(MOULD))
@@ -287,10 +287,10 @@ def test_bad_input_to_fit(arguments, message, tmp_path):
 
 def test_predict_writes_fields_that_check_takes(tmp_path):
     from raptor.dataset.scaling import Scaling
-    from raptor.surrogate.calibration import Calibration, Scale
+    from raptor.surrogate.bands import Calibration, Scale
     from raptor.surrogate.files import save
     from raptor.surrogate.networks import Architecture, Generator, initialise
-    from raptor.surrogate.novelty import DESCRIPTORS, Novelty
+    from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty
 
     architecture = Architecture(32, 4)
     scaling = Scaling((0.5,) * 8, (0.5,) * 8)
@@ -354,7 +354,7 @@ def test_a_full_disk_stops_a_simulation_with_one_sentence(tmp_path):
     script = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
-        "import raptor.files as f; f._is_full = lambda folder: True;"
+        "import raptor.core.files as f; f._is_full = lambda folder: True;"
         "from raptor.cli import main; main()"
     )
     output = tmp_path / "x.nc"

@@ -5,9 +5,9 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from raptor.configuration import Configuration, Tissue, load, load_tissues, require_measured
-from raptor.errors import RaptorError
-from raptor.reference import key_table, write_reference
+from raptor.config import Configuration, Tissue, load, load_tissues, require_measured
+from raptor.config.reference import key_table, write_reference
+from raptor.core.errors import RaptorError
 
 
 @pytest.fixture
@@ -166,7 +166,7 @@ def test_a_gpu_is_not_made_up(monkeypatch):
     """Here, whatever the machine has: nvidia-smi and torch are told to see none, or one."""
     import torch
 
-    from raptor.device import chosen_device
+    from raptor.core.device import chosen_device
 
     monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)

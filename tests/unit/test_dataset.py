@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 import shapely
 
-from raptor.dataset import shards, simulating
+from raptor.core.errors import RaptorError
+from raptor.dataset import run as running
+from raptor.dataset import shards
 from raptor.dataset.card import card
-from raptor.dataset.checks import check
+from raptor.dataset.check import check
+from raptor.dataset.compare import differences
 from raptor.dataset.design import read_design, sample_design
 from raptor.dataset.examples import augment, read_examples, training_scaling
 from raptor.dataset.progress import progress_of
-from raptor.dataset.same import differences
 from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
 from raptor.dataset.well import write_well
-from raptor.errors import RaptorError
 from raptor.moulds import Mould, read_moulds
 from raptor.parameters import CellParameters
 from raptor.symmetry import FIELDS, Element, apply
@@ -210,7 +211,7 @@ def test_inputs_are_masks_and_constants_in_minus_one_to_one():
 def test_a_failed_simulation_is_recorded_and_the_rest_survives(made, tmp_path, monkeypatch):
     """One simulation raises, one gives NaN, one fails but once; the data set states the two that are lost."""
     folder = tmp_path / "unit"
-    really, tries = simulating.simulate, []
+    really, tries = running.simulate, []
 
     def sometimes(mould, parameters, model, accuracy, seed):
         number = next(run.simulation for run in design if run.seed == seed)
@@ -221,7 +222,7 @@ def test_a_failed_simulation_is_recorded_and_the_rest_survives(made, tmp_path, m
         return replace(made_one, energy=np.nan) if number == 4 else made_one
 
     design = read_design(made / "design" / "design.csv")
-    monkeypatch.setattr(simulating, "simulate", sometimes)
+    monkeypatch.setattr(running, "simulate", sometimes)
     build(folder, 3)
     assert tries == [0, 1, 1, 2, 2, 3, 4, 4, 5]
     found = shards.read_shard(folder / "simulations" / "0.nc")
@@ -241,7 +242,7 @@ def test_a_split_without_simulations_stops_the_data_set(tmp_path, monkeypatch):
     def never(*arguments):
         raise ZeroDivisionError("never")
 
-    monkeypatch.setattr(simulating, "simulate", never)
+    monkeypatch.setattr(running, "simulate", never)
     with pytest.raises(RaptorError, match=r"every simulation of the split '\w+' failed"):
         build(tmp_path / "unit", 6)
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from raptor.errors import RaptorError
-from raptor.fields import SIGMA, normalised, rasterise
-from raptor.moulds import IMAGE_SIZE
+from raptor.core.errors import RaptorError
+from raptor.fields.raster import SIGMA, normalised, rasterise
+from raptor.frame import IMAGE_SIZE
 from tests import naive
 
 

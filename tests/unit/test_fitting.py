@@ -10,8 +10,9 @@ from PIL import Image
 from scipy.stats import qmc
 
 from raptor.condor import simulate
-from raptor.errors import RaptorError
-from raptor.fields import rasterise
+from raptor.core.errors import RaptorError
+from raptor.fields.raster import rasterise
+from raptor.fields.shape import density_threshold, shape_ratios
 from raptor.fitting import (
     Outline,
     Sampled,
@@ -41,13 +42,12 @@ from raptor.fitting import (
     unit_of,
     write_fit,
 )
-from raptor.fitting.further import expected_left
+from raptor.fitting.experimental_design import expected_left
 from raptor.fitting.measurements import SEEN, thickness_ratio
 from raptor.fitting.posterior import interpolation_error
 from raptor.fitting.targets import as_array, prior_density
-from raptor.morphology import density_threshold, shape_ratios
+from raptor.frame import pixel_centres
 from raptor.moulds import Mould
-from raptor.moulds.raster import pixel_centres
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters, NetworkModel
 
 TRUTH = CellParameters(0.6, 0.4, 0.2)

@@ -2,9 +2,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from raptor.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
+from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
+from raptor.studies.tradeoff import Reference, _resampled, summarise
 from raptor.symmetry import FIELDS
-from raptor.tradeoff import Reference, _resampled, summarise
 
 RNG = np.random.default_rng(0)
 
@@ -73,7 +73,7 @@ def test_a_summary_has_a_row_a_method():
             "method": ["reference, seed 1", "reference, seed 2", "reference, seed 1", "standard"],
             "core_seconds": [1.0, 4.0, 2.0, 0.5],
             "cells": [100] * 4,
-            "folded_fraction": 0.0,
+            "inverted_fraction": 0.0,
             "energy_above_best": [0.0, 0.1, 0.0, 0.2],
         }
         | {f"{name}_error": [1.0, -2.0, 3.0, 1.5] for name in ("density", "sxsx", "area", "width")}

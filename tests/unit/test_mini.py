@@ -10,16 +10,16 @@ import torch
 import yaml
 from torch.utils.data import DataLoader
 
-from raptor.condor.accuracy import simulate
-from raptor.dataset.checks import check
+from raptor.condor.simulate import simulate
+from raptor.core.errors import RaptorError
+from raptor.dataset.check import check
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.provenance import trace_example, trace_simulation
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples
-from raptor.errors import RaptorError
-from raptor.fields import rasterise
+from raptor.fields.raster import rasterise
 from raptor.moulds import moulds_by_id
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.symmetry import Element, apply
@@ -112,7 +112,7 @@ def test_the_tutorial_runs():
 
 
 def test_the_storage_benchmark_prints_its_tables():
-    command = [sys.executable, "-m", "raptor.benchmark.storage", str(MINI), "--samples", "8"]
+    command = [sys.executable, "-m", "benchmarks.storage", str(MINI), "--samples", "8"]
     done = subprocess.run([*command, "--channels", "2"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     for text in ("zstd 9", "zlib 1, 15 bits", "loader, 2 workers", "training, 2 base channels"):

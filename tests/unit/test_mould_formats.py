@@ -11,9 +11,10 @@ import shapely
 from PIL import Image
 
 from raptor.condor.lattice import cast_sites
-from raptor.errors import RaptorError
-from raptor.moulds import Circle, Mould, PolygonTether, pixel_centres, read_mould
-from raptor.moulds.standard import STANDARD
+from raptor.core.errors import RaptorError
+from raptor.frame import pixel_centres
+from raptor.moulds import Circle, Mould, PolygonTether, read_mould
+from raptor.moulds.library import STANDARD
 from raptor.moulds.summary import summarise, symmetry_class
 
 ROOT = Path(__file__).parents[2]

@@ -6,18 +6,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from raptor.errors import RaptorError
-from raptor.moulds import (
-    Circle,
-    Mould,
-    PolygonTether,
-    mould_image,
-    read_mould,
-    read_moulds,
-    write_moulds,
-)
+from raptor.core.errors import RaptorError
+from raptor.moulds import Circle, Mould, PolygonTether, mould_image, read_mould, read_moulds, write_moulds
+from raptor.moulds.library import STANDARD
 from raptor.moulds.random_moulds import GROUPS, RandomMoulds
-from raptor.moulds.standard import STANDARD
 from raptor.symmetry import Element
 
 RULES = RandomMoulds(

@@ -2,8 +2,8 @@ import base64
 
 import pytest
 
-from raptor.errors import RaptorError
-from raptor.report import NOTHING, number, percent, section, write_report
+from raptor.core.errors import RaptorError
+from raptor.report.html import NOTHING, number, percent, section, write_report
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,14 @@ import pytest
 import shapely
 import torch
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.examples import augment, training_scaling
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
-from raptor.errors import RaptorError
 from raptor.moulds import Mould, mould_image
 from raptor.parameters import CellParameters
-from raptor.surrogate.feeding import Feeder
+from raptor.surrogate.batches import Feeder
 from raptor.surrogate.files import load, save
 from raptor.surrogate.losses import discriminator_loss, generator_loss, relative_distance
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise

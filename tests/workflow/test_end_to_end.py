@@ -13,8 +13,8 @@ import xarray as xr
 import yaml
 from safetensors.numpy import load_file
 
-from raptor.dataset.checks import check
-from raptor.dataset.same import differences
+from raptor.dataset.check import check
+from raptor.dataset.compare import differences
 from raptor.symmetry import FIELDS
 from tests.workflow.conftest import TINY
 

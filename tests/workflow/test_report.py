@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from raptor.report import number
+from raptor.report.html import number
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 LOADS = {"src", "srcset", "poster", "data", "background"}

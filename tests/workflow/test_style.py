@@ -75,7 +75,7 @@ def test_imports_run_one_way():
 
 def test_a_simulation_job_leaves_heavy_imports_alone():
     modules = (
-        "raptor.dataset.design, raptor.dataset.shards, raptor.dataset.simulating, raptor.jobs, raptor.moulds"
+        "raptor.dataset.design, raptor.dataset.shards, raptor.dataset.run, raptor.core.jobs, raptor.moulds"
     )
     heavy = "{'torch', 'xarray', 'pandas', 'matplotlib', 'pydantic'}"
     done = run(sys.executable, "-c", f"import sys, {modules}; print({heavy} & set(sys.modules))")

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from raptor import MODEL_VERSION, configuration
-from raptor.baselines import BASELINES
-from raptor.compiled import source_hash
-from raptor.errors import RaptorError
+from raptor import config as configuration
+from raptor.core.version import MODEL_VERSION
+from raptor.surrogate.baselines import BASELINES
+from raptor.core.compiled import source_hash
+from raptor.core.errors import RaptorError
 
 if "name" not in config:
     raise WorkflowError(

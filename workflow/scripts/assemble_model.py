@@ -6,12 +6,12 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from raptor.configuration import content_hash
+from raptor.config import content_hash
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged, progress
 from raptor.dataset.stack import read_table
-from raptor.files import atomic_path
-from raptor.jobs import logged, progress
 from raptor.moulds import moulds_by_id
-from raptor.surrogate.calibrating import calibrate
+from raptor.surrogate.calibration import calibrate
 from raptor.surrogate.files import describe, load, save
 
 with logged(snakemake.log[0]):
@@ -21,8 +21,10 @@ with logged(snakemake.log[0]):
     surrogate = replace(trained[0], members=tuple(each.members[0] for each in trained))
     stack = Path(snakemake.input.stack)
     moulds = moulds_by_id(Path(snakemake.input.moulds))
-    with progress("calibration", len(read_table(stack).rows("validation"))) as done:
-        found = calibrate(surrogate, stack, moulds, snakemake.params.seed, lambda s: done(f"simulation {s}"))
+    with progress("calibration", len(read_table(stack).rows("validation"))) as advance:
+        found = calibrate(
+            surrogate, stack, moulds, snakemake.params.seed, lambda s: advance(f"simulation {s}")
+        )
     described = [describe(folder) for folder in folders]
     save(
         Path(snakemake.output.weights).parent,

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from raptor.core.jobs import logged
 from raptor.dataset.examples import augment, materialise, training_scaling, write_examples
 from raptor.dataset.scaling import write_scaling
-from raptor.jobs import logged
 
 with logged(snakemake.log[0]):
     stack = Path(snakemake.input.stack)

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
+from raptor.core.device import chosen_device
+from raptor.core.jobs import logged, progress
 from raptor.dataset.design import read_design
 from raptor.dataset.stack import build_stack
-from raptor.device import chosen_device
-from raptor.jobs import logged, progress
 from raptor.moulds import moulds_by_id
 
 with logged(snakemake.log[0]):
     runs = read_design(Path(snakemake.input.design))
-    with progress("field stack", len(runs)) as done:
+    with progress("field stack", len(runs)) as advance:
         build_stack(
             Path(snakemake.output.stack),
             [Path(shard) for shard in snakemake.input.shards],
@@ -20,5 +20,5 @@ with logged(snakemake.log[0]):
             simulation_configuration=snakemake.params.simulation_configuration,
             configuration=snakemake.params.configuration,
             device=chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0)),
-            done=lambda row: done(f"sample {row}"),
+            advance=lambda row: advance(f"sample {row}"),
         )

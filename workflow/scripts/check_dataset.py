@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from raptor.dataset.checks import check
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.dataset.check import check
 
 with logged(snakemake.log[0]):
     faults = check(Path(snakemake.params.folder), snakemake.params.part)

@@ -6,9 +6,9 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from raptor.evaluation import compare
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.studies.evaluation import compare
 from raptor.surrogate.costs import costs_of
 from raptor.surrogate.files import describe, load
 

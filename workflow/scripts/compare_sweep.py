@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
-from raptor.sweeps import compare, differences
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.studies.sweep import compare, differences
 
 with logged(snakemake.log[0]):
     pairs = zip(snakemake.input.simulated, snakemake.input.predicted, strict=True)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import shapely
 
-from raptor.compiled import source_hash
 from raptor.condor import simulate
-from raptor.fields import rasterise
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.compiled import source_hash
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.fields.raster import rasterise
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
 

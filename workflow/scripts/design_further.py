@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from raptor.configuration import parse
+from raptor.config import parse
+from raptor.core.jobs import logged
 from raptor.dataset.design import read_design, write_design
 from raptor.dataset.further import further_set
-from raptor.jobs import logged
 from raptor.moulds import moulds_by_id, write_moulds
 
 with logged(snakemake.log[0]):

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from raptor.configuration import Sweep
+from raptor.config import Sweep
+from raptor.core.jobs import logged
 from raptor.dataset.design import write_design
 from raptor.dataset.sweep import sweep_runs
-from raptor.jobs import logged
 from raptor.moulds import read_mould, write_moulds
 
 with logged(snakemake.log[0]):

@@ -5,10 +5,10 @@ from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
+from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
 from raptor.fitting import Fit, Simulator, Target, descend_by_simulation, measure_again, unit_of, write_fit
-from raptor.jobs import logged
 from raptor.moulds import read_mould
 from raptor.parameters import CellParameters
 

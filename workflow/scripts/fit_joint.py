@@ -5,9 +5,9 @@ from pathlib import Path
 
 import torch
 
-from raptor.files import atomic_path
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.fitting import Simulator, Target, fit_joint, surrogate_measure, tabulate_joint, write_fit
-from raptor.jobs import logged
 from raptor.moulds import read_mould
 from raptor.surrogate.files import load
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import torch
 
+from raptor.core.jobs import logged
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import record_fields
 from raptor.fitting import recover, write_fit
-from raptor.jobs import logged
 from raptor.moulds import read_mould
 from raptor.surrogate.files import load
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import torch
 
+from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
 from raptor.fitting import Simulator, Target, fit_tissue, write_fit
-from raptor.jobs import logged
 from raptor.moulds import read_mould
 from raptor.parameters import CellParameters
 from raptor.surrogate.files import load

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.evaluation import noise_floor
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.moulds import moulds_by_id
+from raptor.studies.evaluation import noise_floor
 
 with logged(snakemake.log[0]):
     stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))

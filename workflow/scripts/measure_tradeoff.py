@@ -4,11 +4,11 @@ from pathlib import Path
 
 import torch
 
-from raptor.files import atomic_path
-from raptor.jobs import logged, progress
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged, progress
 from raptor.moulds import read_mould
+from raptor.studies.tradeoff import Case, Comparison, compare
 from raptor.surrogate.files import load
-from raptor.tradeoff import Case, Comparison, compare
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
@@ -24,7 +24,7 @@ with logged(snakemake.log[0]):
     )
     trained = snakemake.input.surrogate
     surrogate = load(Path(trained[0]).parent) if trained else None
-    with progress(case.name, comparison.runs) as done:
-        table = compare(case, comparison, surrogate, done)
+    with progress(case.name, comparison.runs) as advance:
+        table = compare(case, comparison, surrogate, advance)
     with atomic_path(Path(snakemake.output.table)) as path:
         table.to_csv(path, index=False)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
-from raptor.metrics import BULK
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.fields.metrics import BULK
 from raptor.plotting import bulk_figure, save
 
 with logged(snakemake.log[0]):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.plotting import calibration_figure, save
 
 with logged(snakemake.log[0]):

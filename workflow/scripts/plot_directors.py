@@ -4,13 +4,13 @@ from pathlib import Path
 
 import torch
 
-from raptor.configuration import Sweep
+from raptor.config import Sweep
+from raptor.core.jobs import logged
 from raptor.dataset.design import read_design
-from raptor.jobs import logged
 from raptor.moulds import read_moulds
 from raptor.plotting import directors_figure, save, save_fields
+from raptor.studies.sweep import middle_points, tissues
 from raptor.surrogate.files import load
-from raptor.sweeps import middle_points, tissues
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from raptor.core.jobs import logged
 from raptor.dataset.stack import read_samples, read_table
-from raptor.jobs import logged
 from raptor.moulds import moulds_by_id
 from raptor.plotting import fields_figure, save, save_fields
 from raptor.surrogate.files import load

@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
+from raptor.core.jobs import logged
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import record_fields
-from raptor.jobs import logged
-from raptor.morphology import density_threshold
+from raptor.fields.shape import density_threshold
 from raptor.moulds import read_mould
 from raptor.plotting import fit_figure, save, save_fields
 from raptor.surrogate.files import load

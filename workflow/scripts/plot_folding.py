@@ -6,21 +6,21 @@ import pandas as pd
 
 from raptor.condor import build_lattice
 from raptor.condor.energy import reversed_share
-from raptor.files import atomic_path
-from raptor.jobs import logged, progress
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged, progress
 from raptor.moulds import read_mould
 from raptor.plotting import folding_figure, save
-from raptor.tradeoff import Case
+from raptor.studies.tradeoff import Case
 
 with logged(snakemake.log[0]):
     case = Case.of(snakemake.params.comparison, read_mould(Path(snakemake.input.mould)))
     lattice = build_lattice(case.mould, case.parameters, case.model)
     methods = ("reference", snakemake.params.method)
-    with progress("folding", len(methods)) as done:
+    with progress("folding", len(methods)) as advance:
         tissues = {}
         for method in methods:
             tissues[method] = case.simulate(method)
-            done(method)
+            advance(method)
     shares = {name: reversed_share(s.positions, lattice) for name, s in tissues.items()}
     save(folding_figure(tissues, shares, case.mould), Path(snakemake.output.png).with_suffix(""))
     parts = [

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.plotting import save, tradeoff_figure
 
 with logged(snakemake.log[0]):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from raptor.core.jobs import logged
 from raptor.dataset.stack import read_samples, read_table
-from raptor.evaluation import worst
-from raptor.jobs import logged
 from raptor.moulds import moulds_by_id
 from raptor.plotting import save, save_fields, worst_figure
+from raptor.studies.evaluation import worst
 from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from raptor.configuration import parse
+from raptor.config import parse
+from raptor.core.jobs import logged
 from raptor.dataset.design import sample_design, write_design
-from raptor.jobs import logged
 from raptor.moulds import write_moulds
 
 with logged(snakemake.log[0]):

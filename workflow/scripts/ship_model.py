@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
-from raptor.model_card import model_card
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.report.model_card import model_card
 from raptor.surrogate.files import describe, load, save
 
 with logged(snakemake.log[0]):

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from raptor.core.device import chosen_device
+from raptor.core.jobs import logged, progress
 from raptor.dataset.design import read_design
+from raptor.dataset.run import simulate_shard
 from raptor.dataset.shards import write_shard
-from raptor.dataset.simulating import simulate_shard
-from raptor.device import chosen_device
-from raptor.jobs import logged, progress
 from raptor.moulds import moulds_by_id
 from raptor.parameters import NetworkModel
 
@@ -17,14 +17,14 @@ with logged(snakemake.log[0]):
     params = snakemake.params
     model = NetworkModel(params.layers, tuple(params.shells), params.tension)
     device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
-    with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as done:
+    with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as advance:
         simulations, failures = simulate_shard(
             runs,
             moulds,
             model,
             params.accuracy,
             device,
-            lambda run, outcome: done(f"{run.simulation}: {outcome}"),
+            lambda run, outcome: advance(f"{run.simulation}: {outcome}"),
         )
     write_shard(
         Path(snakemake.output.shard),

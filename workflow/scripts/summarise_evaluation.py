@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.evaluation import regions_of, summarise
-from raptor.files import atomic_path
-from raptor.jobs import logged
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.studies.evaluation import regions_of, summarise
 
 with logged(snakemake.log[0]):
     floor = pd.read_csv(snakemake.input.floor)

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from raptor.files import atomic_path
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.fitting import tabulate
-from raptor.jobs import logged
 
 with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.table)) as path:
     named = (snakemake.input.get(name, []) for name in ("fits", "simulators"))

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.files import atomic_path
-from raptor.jobs import logged
-from raptor.tradeoff import summarise
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.studies.tradeoff import summarise
 
 with logged(snakemake.log[0]):
     table = pd.concat([pd.read_csv(path) for path in snakemake.input.cases], ignore_index=True)

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.configuration import content_hash
+from raptor.config import content_hash
+from raptor.core.device import chosen_device
+from raptor.core.jobs import logged, progress
 from raptor.dataset.examples import read_examples, with_further
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
-from raptor.device import chosen_device
-from raptor.jobs import logged, progress
 from raptor.surrogate.files import load, save
 from raptor.surrogate.networks import architecture_of
 from raptor.surrogate.training import describe, joined, rules_of, train, write_history
@@ -29,7 +29,7 @@ with logged(snakemake.log[0]):
     files += [str(read_table(path).parameters) for path in extra]
     files += [(begun / "model.json").read_text()] if begun else []
     identity = content_hash([snakemake.params.identity, snakemake.params.seed, *files])
-    with progress("training", rules.epochs) as done:
+    with progress("training", rules.epochs) as advance:
         trained = train(
             [stack, *extra],
             examples,
@@ -39,7 +39,7 @@ with logged(snakemake.log[0]):
             rules,
             Path(snakemake.params.checkpoint),
             identity,
-            lambda epoch, row: done(f"epoch {epoch}, validation error {row['validation_error']:.3f}"),
+            lambda epoch, row: advance(f"epoch {epoch}, validation error {row['validation_error']:.3f}"),
             load(begun).members[0].state_dict() if begun else None,
         )
     save(

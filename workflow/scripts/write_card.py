@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
 from raptor.dataset.card import card
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
 from raptor.dataset.shards import read_shard
-from raptor.files import atomic_path
-from raptor.jobs import logged
 from raptor.moulds import read_moulds
 
 with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.card)) as path:

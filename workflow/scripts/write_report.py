@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from raptor.jobs import logged
-from raptor.report import write_report
+from raptor.core.jobs import logged
+from raptor.report.html import write_report
 
 with logged(snakemake.log[0]):
     path = Path(snakemake.output.report)

@@ -13,7 +13,7 @@ from raptor.cli.fit import fit
 from raptor.cli.measure import measure
 from raptor.cli.predict import predict
 from raptor.cli.simulate import simulate
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 HELP = """Rapid prediction of tissue organisation: CONDOR simulations and their surrogate.
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 import yaml
 
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 
 def progress(
@@ -50,7 +50,7 @@ def check(
       raptor check results/laptop
       raptor check mould.svg
     """
-    from raptor.dataset.checks import check as find_faults
+    from raptor.dataset.check import check as find_faults
 
     if not path.exists():
         raise RaptorError(f"{path} does not exist; check the path")
@@ -92,7 +92,7 @@ def same(
     Example:
       raptor same results/laptop results/again
     """
-    from raptor.dataset.same import differences
+    from raptor.dataset.compare import differences
 
     for folder in (first, second):
         if not (folder / "dataset" / "fields.nc").is_file():
@@ -112,7 +112,7 @@ def reference(
     Example:
       raptor reference .
     """
-    from raptor.reference import write_reference
+    from raptor.config.reference import write_reference
 
     for path in write_reference(root):
         typer.echo(path)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from raptor.cli.options import Json, Layers, Mould, Scale, report, require_picture_writable, require_writable
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 
 def draw(

@@ -19,7 +19,7 @@ from raptor.cli.options import (
     require_picture_writable,
     require_writable,
 )
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 By = Literal["surrogate", "simulator"]
 
@@ -130,7 +130,7 @@ def _target(
     if outline is not None:
         return read_outline(outline)
     if tissue is not None:
-        from raptor.configuration import load_tissue
+        from raptor.config import load_tissue
 
         found = load_tissue(tissues, tissue)
         if not found.measured:

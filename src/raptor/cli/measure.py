@@ -40,20 +40,20 @@ def measure(
       raptor measure photograph.png --mould config/moulds/four_post_rectangle.geojson
           --overlay overlay.png --outline tissue.geojson
     """
-    from raptor import measuring
-    from raptor.files import atomic_path
-    from raptor.measuring.report import as_feature, as_record, as_sentence
+    from raptor import imaging
+    from raptor.core.files import atomic_path
+    from raptor.imaging.report import as_feature, as_record, as_sentence
     from raptor.moulds import read_mould
 
-    appearance, shape = measuring.tissue_named(look), read_mould(mould, scale)
+    appearance, shape = imaging.tissue_named(look), read_mould(mould, scale)
     for output, other in ((overlay, outline), (outline, overlay)):
         if output is not None:
             require_writable(output, image, mould, other, kind="a file")
-    picture = measuring.read_picture(image)
-    registration = measuring.register(picture, shape, landmarks or (), aligned, mirrored)
-    measured = measuring.measure(picture, shape, registration, appearance, threshold)
+    picture = imaging.read_picture(image)
+    registration = imaging.register(picture, shape, landmarks or (), aligned, mirrored)
+    measured = imaging.measure(picture, shape, registration, appearance, threshold)
     if overlay is not None:
-        from raptor.measuring.overlay import write_overlay
+        from raptor.imaging.overlay import write_overlay
 
         write_overlay(overlay, picture, shape, measured)
     if outline is not None:

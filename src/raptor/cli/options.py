@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 from raptor.parameters import CellParameters
 
 Mould = Annotated[Path, typer.Argument(help="mould: GeoJSON, SVG or PNG (docs/moulds.md)")]
@@ -54,7 +54,7 @@ def cell_parameters(
     names = [field.name for field in fields(CellParameters)]
     given = {name: value for name, value in zip(names, values, strict=True) if value is not None}
     if tissue is not None:
-        from raptor.configuration import load_tissue
+        from raptor.config import load_tissue
 
         return load_tissue(tissues, tissue).parameters(tissue, given)
     missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]

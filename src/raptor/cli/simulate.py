@@ -24,7 +24,7 @@ from raptor.cli.options import (
     require_picture_writable,
     require_writable,
 )
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 
 PIXELS = 256  # along a side of the image that shape is measured in and drawn (paper)
 
@@ -57,11 +57,11 @@ def simulate(
     """
     from raptor.condor import accuracy_named
     from raptor.condor import simulate as run_simulation
-    from raptor.configuration import content_hash
+    from raptor.config import content_hash
     from raptor.dataset.design import Run
     from raptor.dataset.shards import write_shard
-    from raptor.fields import rasterise
-    from raptor.morphology import shape_ratios
+    from raptor.fields.raster import rasterise
+    from raptor.fields.shape import shape_ratios
     from raptor.moulds import read_mould
     from raptor.parameters import NetworkModel
 
@@ -88,12 +88,12 @@ def simulate(
     numbers = {
         "mould": shape.name, **values, "layers": layers, "accuracy": accuracy, "seed": seed,
         "cells": made.cells, "energy": made.energy, "converged": made.converged,
-        "folded_fraction": made.folded_fraction, "area_ratio": area, "width_ratio": width,
+        "inverted_fraction": made.inverted_fraction, "area_ratio": area, "width_ratio": width,
         "wall_time": made.wall_time, "output": output, "picture": picture,
     }  # fmt: skip
     state = "converged" if made.converged else "NOT converged"
     sentence = (
         f"{output}: {made.cells} cells, energy {made.energy:.4g} kappa0 l0^2, {state}, "
-        f"folded {made.folded_fraction:.1e}, A/A0 {area:.3f}, w/w0 {width:.3f}, {made.wall_time:.1f} s"
+        f"folded {made.inverted_fraction:.1e}, A/A0 {area:.3f}, w/w0 {width:.3f}, {made.wall_time:.1f} s"
     )
     report(sentence, numbers, as_json)

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from raptor.compiled import kernel
 from raptor.condor.energy import SMALLEST_LEVER, SOFTENING, unit_orientations
-from raptor.condor.lanes import lanes, load, positive, sqrt, store, where
 from raptor.condor.network import Network
+from raptor.condor.simd import lanes, load, positive, sqrt, store, where
 from raptor.condor.walls import Walls, wall_energy
-from raptor.errors import RaptorError
+from raptor.core.compiled import kernel
+from raptor.core.errors import RaptorError
 
 INITIAL_TEMPERATURE = 0.0625  # kappa0 l0^2 (paper)
 TEMPERATURE_FACTOR = 1e7  # initial over final temperature (paper)

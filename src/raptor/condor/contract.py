@@ -19,7 +19,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from raptor.condor.anneal import anneal
-from raptor.condor.energy import folded_fraction
+from raptor.condor.energy import inverted_fraction
 from raptor.condor.minimise import Minimum, minimise
 from raptor.condor.system import System
 
@@ -120,7 +120,7 @@ def _unfolded(
     """A minimum without reversed bonds: with contacts from there, or else from the start."""
     used = minimum.evaluations
     for state in (minimum.state, start):
-        if folded_fraction(minimum.state, system.lattice) == 0:
+        if inverted_fraction(minimum.state, system.lattice) == 0:
             break
         minimum = _minimise(state, system, delta, contraction, last, CONTACT)
         used += minimum.evaluations
@@ -189,8 +189,8 @@ def refine(
         found = _unfolded(found, minimum.state, system, delta, contraction, last=True)
         used += found.evaluations
         lower = found.energy + found.walled < minimum.energy + minimum.walled
-        folded = folded_fraction(found.state, system.lattice)
-        unfolded = folded <= folded_fraction(minimum.state, system.lattice)
+        folded = inverted_fraction(found.state, system.lattice)
+        unfolded = folded <= inverted_fraction(minimum.state, system.lattice)
         if lower and unfolded and found.converged >= minimum.converged:
             minimum = found
     return minimum._replace(evaluations=used)

@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from raptor.compiled import kernel
-from raptor.condor.lanes import lanes, load, positive, sqrt, store, total, where
 from raptor.condor.lattice import Lattice
 from raptor.condor.network import Network
+from raptor.condor.simd import lanes, load, positive, sqrt, store, total, where
 from raptor.condor.walls import Walls, near_kernel, wall_energy
-from raptor.errors import RaptorError
+from raptor.core.compiled import kernel
+from raptor.core.errors import RaptorError
 
 SOFTENING = 1e-12  # l0^2, added to |l|^2: two cells on top of each other keep a finite force
 CONTACT_LENGTH = 0.01  # of a bond's rest length
@@ -257,7 +257,7 @@ def _reversed_kernel(positions, sites, first, second):
     return count
 
 
-def folded_fraction(state: NDArray[Any], lattice: Lattice) -> float:
+def inverted_fraction(state: NDArray[Any], lattice: Lattice) -> float:
     """Share of bonds whose direction has reversed since casting; 0 without bonds."""
     count = _reversed_kernel(state, lattice.sites, lattice.first, lattice.second)
     return float(count) / max(1, lattice.bonds)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.moulds.geometry import IMAGE_SIZE, STRICTLY, Mould
+from raptor.core.errors import RaptorError
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import STRICTLY, Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 
 HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond

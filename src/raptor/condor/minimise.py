@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.compiled import kernel
 from raptor.condor.energy import SMALLEST_LEVER, Scratch, _objective_kernel, scratch, unit_orientations
 from raptor.condor.network import Network
 from raptor.condor.walls import Walls
-from raptor.errors import RaptorError
+from raptor.core.compiled import kernel
+from raptor.core.errors import RaptorError
 
 MEMORY = 8  # pairs of steps that the inverse Hessian is built from
 MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell

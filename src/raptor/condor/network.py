@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from raptor.condor.lanes import lanes
 from raptor.condor.lattice import Lattice
+from raptor.condor.simd import lanes
 
 
 class Network(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.compiled import kernel
+from raptor.core.compiled import kernel
 from raptor.moulds.geometry import Mould
 
 SPACING = 0.25  # of the table, l0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from raptor import MODEL_VERSION, __version__
+from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.design import SPLITS, Run
 from raptor.dataset.examples import Example
 from raptor.dataset.netcdf import REFERENCES
@@ -79,7 +79,7 @@ def card(
     for shard in shards:
         times += [record.wall_time for record in shard.records]
         failures |= shard.failures
-        folded = max([folded, *(record.folded_fraction for record in shard.records)])
+        folded = max([folded, *(record.inverted_fraction for record in shard.records)])
         unconverged += sum(not record.converged for record in shard.records)
     assert shard is not None  # a data set has at least one shard
     augmented = Counter(table.split[example.sample] for example in examples)

@@ -11,18 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import RandomMoulds
-from raptor.parameters import (
-    DELTA,
-    KAPPA_NNN,
-    KAPPA_NNNN,
-    Bounds,
-    CellParameters,
-    largest_kappa_nnnn,
-)
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
 
 SPLITS = ("train", "validation", "test")
 COLUMNS = (

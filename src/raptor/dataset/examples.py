@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
 from raptor.dataset.netcdf import create
 from raptor.dataset.scaling import Scaling, fit_scaling
 from raptor.dataset.stack import Sample, create_stack, read_samples, read_table
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 

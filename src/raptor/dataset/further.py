@@ -11,9 +11,10 @@ import numpy as np
 import shapely
 import shapely.affinity
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.design import DesignRules, Run, draw_parameters, sample_design
-from raptor.errors import RaptorError
-from raptor.moulds.geometry import IMAGE_SIZE, SMALLEST_TETHER, Circle, Mould, PolygonTether
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import SMALLEST_TETHER, Circle, Mould, PolygonTether
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.parameters import Bounds, CellParameters
 

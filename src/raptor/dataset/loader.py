@@ -13,7 +13,7 @@ from torch.utils.data import Dataset
 from raptor.dataset.examples import Example
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.dataset.stack import read_table
-from raptor.resolution import pooled
+from raptor.fields.resample import pooled
 from raptor.symmetry import Element, apply, move_pixels
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from raptor import MODEL_VERSION, __version__
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.version import MODEL_VERSION, __version__
 
 REFERENCES = (
     "Andrews et al., Rapid prediction of organisation in engineered corneal, glial and fibroblast "

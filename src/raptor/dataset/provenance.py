@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Any
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures, shard_paths
 from raptor.dataset.stack import LONG_NAMES, read_table
-from raptor.errors import RaptorError
-from raptor.fields import SIGMA
+from raptor.fields.raster import SIGMA
+from raptor.frame import pixel_size
 from raptor.moulds.geojson import moulds_by_id
-from raptor.moulds.raster import pixel_size
 from raptor.symmetry import Element
 
 MADE_BY = (

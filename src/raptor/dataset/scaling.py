@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.symmetry import FIELDS
 

@@ -9,12 +9,12 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor import MODEL_VERSION
-from raptor.condor.accuracy import Simulation, accuracy_named
 from raptor.condor.lattice import Lattice, connect
+from raptor.condor.simulate import Simulation, accuracy_named
+from raptor.core.errors import RaptorError
+from raptor.core.version import MODEL_VERSION
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.errors import RaptorError
 from raptor.parameters import CellParameters, NetworkModel
 
 PARAMETERS = {
@@ -29,7 +29,7 @@ RESULTS = {
     "gradient": "largest gradient left, contacts included, by position or by orientation over delta "
     "(at least 0.02), in kappa0 l0",
     "converged": "1 where the gradient fell below the solver's tolerance times delta (at least 0.02)",
-    "folded_fraction": "share of bonds whose direction reversed since casting",
+    "inverted_fraction": "share of bonds whose direction reversed since casting",
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",
 }
@@ -50,7 +50,7 @@ class Record:
     seed: int
     energy: float
     converged: bool
-    folded_fraction: float
+    inverted_fraction: float
     wall_time: float
     sites: NDArray[np.float64]
     positions: NDArray[np.float64]
@@ -226,7 +226,7 @@ def _read_records(file: netCDF4.Dataset) -> list[Record]:
                 seed=int(values["seed"][row]),
                 energy=float(values["energy"][row]),
                 converged=bool(values["converged"][row]),
-                folded_fraction=float(values["folded_fraction"][row]),
+                inverted_fraction=float(values["inverted_fraction"][row]),
                 wall_time=float(values["wall_time"][row]),
                 sites=block[:, 0:3],
                 positions=block[:, 3:6],

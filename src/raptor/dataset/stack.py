@@ -9,13 +9,14 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
 from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard, write_model
-from raptor.errors import RaptorError
-from raptor.fields import rasterise
+from raptor.fields.raster import rasterise
+from raptor.frame import pixel_centres
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image, pixel_centres
+from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters
 from raptor.symmetry import FIELDS
 
@@ -51,7 +52,7 @@ def record_fields(record: Record, pixels: int, device: str = "cpu") -> NDArray[n
         return rasterise(*cells, pixels).astype(np.float32)
     import torch  # here: without a GPU the stack is built without it
 
-    from raptor.fields_batch import rasterise as rasterise_on
+    from raptor.condor.gpu.raster import rasterise as rasterise_on
 
     return rasterise_on(*cells, pixels, torch.device(device))
 
@@ -66,7 +67,7 @@ def build_stack(
     simulation_configuration: str,
     configuration: str,
     device: str = "cpu",
-    done: Callable[[int], None] = lambda sample: None,
+    on_progress: Callable[[int], None] = lambda sample: None,
 ) -> None:
     """Rasterise every simulation of the shards, on a device, into one file, sample by sample.
 
@@ -104,7 +105,7 @@ def build_stack(
                 left.remove(record.simulation)
                 run = by_id[record.simulation]
                 write(order[record.simulation], _sample(record, run, moulds[run.mould], pixels, device))
-                done(order[record.simulation])
+                on_progress(order[record.simulation])
         if left:
             raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
 

@@ -14,11 +14,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.core.files import atomic_path
 from raptor.dataset.design import SPLITS
 from raptor.dataset.shards import PARAMETERS
 from raptor.dataset.stack import read_samples, read_table
-from raptor.files import atomic_path
-from raptor.moulds.raster import pixel_centres
+from raptor.frame import pixel_centres
 from raptor.symmetry import FIELDS
 
 FOLDERS = {"train": "train", "validation": "valid", "test": "test"}

@@ -1,28 +1,15 @@
 """Fitting cell and matrix parameters to tissues: least squares, posteriors, outlines (docs/fits.md)."""
 
 from raptor.fitting.bound import simulate_at_delta
-from raptor.fitting.correcting import correct
-from raptor.fitting.further import Sampled, rank_measurements, simulate_draws
+from raptor.fitting.experimental_design import Sampled, rank_measurements, simulate_draws
 from raptor.fitting.joint import fit_joint
-from raptor.fitting.least_squares import (
-    Fit,
-    Minimum,
-    descend,
-    fit,
-    minimise,
-)
+from raptor.fitting.least_squares import Fit, Minimum, descend, fit, minimise
 from raptor.fitting.measurements import CANDIDATES, seen
-from raptor.fitting.outline import (
-    Outline,
-    deviations,
-    distances,
-    outline_measure,
-    outline_of,
-    read_outline,
-)
+from raptor.fitting.outline import Outline, deviations, distances, outline_measure, outline_of, read_outline
 from raptor.fitting.posterior import Posterior, Survey, infer, profile, summarise, survey
 from raptor.fitting.recovery import recover
 from raptor.fitting.simulator import Simulator, descend_by_simulation, measure_again
+from raptor.fitting.space_mapping import correct
 from raptor.fitting.tables import tabulate, tabulate_joint, write_fit
 from raptor.fitting.targets import (
     PARAMETERS,

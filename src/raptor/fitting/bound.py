@@ -15,7 +15,7 @@ CORNERS = ((0.0, 0.0), (0.0, 1.0), (0.5, 0.5), (1.0, 0.0), (1.0, 1.0))
 
 
 def simulate_at_delta(
-    simulator: Simulator, mould: Mould, delta: float, done: Callable[[str], None] = lambda note: None
+    simulator: Simulator, mould: Mould, delta: float, on_progress: Callable[[str], None] = lambda note: None
 ) -> pd.DataFrame:
     """Area and width ratio at one delta over the range of spring constants: its corners and its centre."""
     rows = []
@@ -23,6 +23,6 @@ def simulate_at_delta(
         parameters = replace(parameters_at(np.array([0.0, *corner])), delta=delta)
         made = simulator.run(mould, parameters)
         row = asdict(parameters) | dict(zip(RATIOS, simulator.ratios(made, mould), strict=True))
-        rows.append(row | {"converged": made.converged, "folded_fraction": made.folded_fraction})
-        done(str(made))
+        rows.append(row | {"converged": made.converged, "inverted_fraction": made.inverted_fraction})
+        on_progress(str(made))
     return pd.DataFrame(rows)

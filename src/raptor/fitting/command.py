@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.fitting.correcting import correct
+from raptor.core.errors import RaptorError
+from raptor.fields.shape import density_threshold, ratios_above
 from raptor.fitting.least_squares import Minimum, Residuals, minimise
 from raptor.fitting.outline import Densities, Outline, deviations, outline_measure
 from raptor.fitting.posterior import infer, summarise, survey
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
+from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import (
     PARAMETERS,
     Measure,
@@ -22,7 +23,6 @@ from raptor.fitting.targets import (
     surrogate_measure,
     unit_of,
 )
-from raptor.morphology import density_threshold, ratios_above
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters

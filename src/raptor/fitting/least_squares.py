@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 from raptor.fitting.targets import Measure, Target, parameters_at
 from raptor.parameters import CellParameters
 
@@ -182,7 +182,7 @@ def descend(
     enough: float,
     tolerance: float,
 ) -> Minimum:
-    """Go down from a point (3,) of the unit cube, by a model that may be dear and noisy.
+    """Go down from a point (3,) of the unit cube, by a model that may be expensive and noisy.
 
     Parameters
     ----------

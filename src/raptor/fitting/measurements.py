@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.accuracy import Simulation
+from raptor.condor.simulate import Simulation
+from raptor.fields.shape import area_ratio, long_axis, section_ratio, sections, width_ratio
 from raptor.fitting.targets import RATIOS
-from raptor.morphology import area_ratio, long_axis, section_ratio, sections, width_ratio
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.symmetry import FIELDS

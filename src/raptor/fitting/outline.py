@@ -18,13 +18,12 @@ from PIL import Image
 from skimage.filters import threshold_otsu
 from skimage.measure import find_contours
 
-from raptor.errors import RaptorError
-from raptor.files import read_input
+from raptor.core.errors import RaptorError
+from raptor.core.files import read_input
 from raptor.fitting.least_squares import Minimum
 from raptor.fitting.targets import Measure, as_array, parameters_at
+from raptor.frame import IMAGE_SIZE, pixel_size
 from raptor.moulds.bitmap import DAMAGE, MOST_PIXELS
-from raptor.moulds.geometry import IMAGE_SIZE
-from raptor.moulds.raster import pixel_size
 from raptor.parameters import CellParameters
 
 POINTS = 128  # along the measured outline

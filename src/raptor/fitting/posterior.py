@@ -25,13 +25,13 @@ from scipy.linalg import eigh
 from scipy.stats import chi2, norm, qmc
 
 from raptor.condor.lattice import cast_sites
-from raptor.errors import RaptorError
+from raptor.core.errors import RaptorError
 from raptor.fitting.measurements import SEEN, seen
 from raptor.fitting.targets import PARAMETERS, Target, as_array, parameters_at, prior_density
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
-from raptor.surrogate.calibration import LEVELS
+from raptor.surrogate.bands import LEVELS
 from raptor.surrogate.inference import Surrogate
 
 DENSE = 2**16  # points of the posterior

@@ -7,16 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.fields.shape import density_threshold, shape_ratios
 from raptor.fitting.least_squares import minimise
 from raptor.fitting.outline import deviations, outline_measure, outline_of
-from raptor.fitting.targets import (
-    PARAMETERS,
-    Target,
-    as_array,
-    surrogate_densities,
-    surrogate_measure,
-)
-from raptor.morphology import density_threshold, shape_ratios
+from raptor.fitting.targets import PARAMETERS, Target, as_array, surrogate_densities, surrogate_measure
 from raptor.moulds.geometry import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.surrogate.inference import Surrogate

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.accuracy import Simulation, simulate
-from raptor.fields import rasterise
+from raptor.condor.simulate import Simulation, simulate
+from raptor.fields.raster import rasterise
+from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import Minimum, Residuals, descend
 from raptor.fitting.targets import Measure, Target
-from raptor.morphology import shape_ratios
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 

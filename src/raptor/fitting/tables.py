@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from raptor.files import atomic_path
+from raptor.core.files import atomic_path
 from raptor.fitting.targets import PARAMETERS, RATIOS, Target
 
 AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")

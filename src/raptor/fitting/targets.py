@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 from raptor.condor.lattice import cast_sites
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
-from raptor.parameters import (
-    DELTA,
-    KAPPA_NNN,
-    KAPPA_NNNN,
-    Bounds,
-    CellParameters,
-    largest_kappa_nnnn,
-)
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
 from raptor.surrogate.inference import Surrogate
 
 RATIOS = ("area_ratio", "width_ratio")

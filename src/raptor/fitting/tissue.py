@@ -5,10 +5,10 @@ from dataclasses import asdict
 from time import perf_counter
 from typing import Any
 
-from raptor.condor.accuracy import Simulation
-from raptor.fitting.correcting import correct
+from raptor.condor.simulate import Simulation
 from raptor.fitting.least_squares import Fit, minimise
 from raptor.fitting.simulator import ENOUGH, Simulator, measure_again
+from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import Target, surrogate_measure
 from raptor.moulds.geometry import Mould
 from raptor.surrogate.inference import Surrogate

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from skimage.measure import find_contours
 
-from raptor.errors import RaptorError
-from raptor.files import read_input
+from raptor.core.errors import RaptorError
+from raptor.core.files import read_input
 from raptor.moulds.drawing import Drawing, Page
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 

@@ -8,8 +8,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.moulds.geometry import IMAGE_SIZE, Circle, Mould, PolygonTether, Tether, require_standing
+from raptor.core.errors import RaptorError
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether, require_standing
 
 ROW = 0.5  # l0; rows of sites of all layers, along x and along y
 LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this

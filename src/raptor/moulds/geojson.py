@@ -9,8 +9,8 @@ from typing import Any
 
 import shapely
 
-from raptor.errors import RaptorError
-from raptor.files import atomic_path, read_input
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path, read_input
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
 PROPERTIES = ("mould", "tethers", "symmetry", "area")

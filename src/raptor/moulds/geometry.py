@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from shapely.affinity import translate
 from shapely.validation import explain_validity
 
-from raptor.errors import RaptorError
-
-IMAGE_SIZE = 62.5
-"""Side of the square image, in l0; its centre is the origin (paper: 256 pixels of 125/512 l0)."""
+from raptor.core.errors import RaptorError
+from raptor.frame import IMAGE_SIZE
 
 SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
 STRICTLY = 1e-9  # a site this close to a wall does not hold a cell
@@ -161,7 +159,7 @@ class Mould:
             )
         for number, tether in enumerate(self.tethers, start=1):
             require_standing(tether, self.outline, f"{self.name}: tether {number}")
-        # Most moulds have room left whatever their tethers overlap; the union is dear.
+        # Most moulds have room left whatever their tethers overlap; the union is expensive.
         room = self.outline.area - sum(tether.area for tether in self.tethers)
         if room < 1e-6 and self.depression.area < 1e-6:
             raise RaptorError(f"{self.name}: the tethers cover the depression; nothing is left to cast")

@@ -13,8 +13,9 @@ import shapely
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.moulds.geometry import IMAGE_SIZE, Circle, Mould
+from raptor.core.errors import RaptorError
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import Circle, Mould
 from raptor.symmetry import Element
 
 SMOOTH_CORNERS = 96  # corners that draw a smooth outline

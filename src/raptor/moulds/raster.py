@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.errors import RaptorError
-from raptor.moulds.geometry import IMAGE_SIZE, STRICTLY, Mould, signed_depth
+from raptor.core.errors import RaptorError
+from raptor.frame import pixel_centres
+from raptor.moulds.geometry import STRICTLY, Mould, signed_depth
 
 
 @dataclass(frozen=True)
@@ -15,16 +16,6 @@ class MouldImage:
 
     depression: NDArray[np.bool_]
     tethers: NDArray[np.bool_]
-
-
-def pixel_size(pixels: int) -> float:
-    """Side of a pixel, l0."""
-    return IMAGE_SIZE / pixels
-
-
-def pixel_centres(pixels: int) -> NDArray[np.float64]:
-    """Coordinates of pixel centres along one axis, ascending, (pixels,), l0."""
-    return np.asarray((np.arange(pixels) - (pixels - 1) / 2) * pixel_size(pixels))
 
 
 def mould_image(mould: Mould, pixels: int) -> MouldImage:

@@ -3,8 +3,8 @@
 from math import isfinite
 from pathlib import Path
 
-from raptor.errors import RaptorError
-from raptor.files import read_input
+from raptor.core.errors import RaptorError
+from raptor.core.files import read_input
 from raptor.moulds.geojson import read_geojson
 from raptor.moulds.geometry import Mould
 

@@ -17,8 +17,8 @@ import numpy as np
 import shapely
 import svgelements
 
-from raptor.errors import RaptorError
-from raptor.files import read_input
+from raptor.core.errors import RaptorError
+from raptor.core.files import read_input
 from raptor.moulds.drawing import Drawing, Page
 from raptor.moulds.geometry import CIRCLE_SEGMENTS, Circle, Mould, PolygonTether, Tether
 

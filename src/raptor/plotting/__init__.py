@@ -15,8 +15,7 @@ from raptor.plotting.drawing import (
     show_field,
     tradeoff_figure,
 )
-from raptor.plotting.fits import fit_figure, valley_figure
-from raptor.plotting.judging import (
+from raptor.plotting.evaluation import (
     calibration_figure,
     enrichment_figure,
     models_figure,
@@ -24,7 +23,8 @@ from raptor.plotting.judging import (
     training_figure,
     worst_figure,
 )
-from raptor.plotting.sweeping import contraction_figure, directors_figure, panels_figure, save_panels
+from raptor.plotting.fits import fit_figure, valley_figure
+from raptor.plotting.sweep import contraction_figure, directors_figure, panels_figure, save_panels
 
 __all__ = [
     "bulk_figure",

@@ -15,10 +15,11 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from raptor.condor import Simulation
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
-from raptor.metrics import BULK
-from raptor.moulds.geometry import IMAGE_SIZE, Mould
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.fields.metrics import BULK
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import Mould
 from raptor.symmetry import FIELDS
 
 SEQUENTIAL, DIVERGING = "cividis", "PuOr"  # perceptually uniform; safe for the colour-blind
@@ -279,7 +280,9 @@ def folding_figure(
         draw_mould(axes, mould, fill=False)
         x0, y0, x1, y1 = mould.outline.bounds
         axes.set(xlim=(x0 - 1, x1 + 1), ylim=(y0 - 1, y1 + 1), aspect="equal")
-        axes.set_title(f"{name}: $E$ = {s.energy:.2f}, reversed {100 * s.folded_fraction:.1f} %", fontsize=9)
+        axes.set_title(
+            f"{name}: $E$ = {s.energy:.2f}, reversed {100 * s.inverted_fraction:.1f} %", fontsize=9
+        )
         axes.set_xlabel("$x$ / $l_0$")
     panels[0].set_ylabel("$y$ / $l_0$")
     figure.colorbar(points, ax=panels, label="share of a cell's bonds reversed", shrink=0.8)

@@ -1,136 +1,110 @@
-"""Bands about predictions, calibrated on the validation split.
+"""Learning on the validation split how errors follow from the spread of networks."""
 
-A band's half width is a factor times sigma, sigma^2 = spread^2 + (floor size)^2: `spread` is how far
-networks and images of D4 disagree, `size` the predicted density where fields are concerned, as the noise of
-single simulations is found where tissue is. The factor of each level is the quantile of |error| / sigma over
-the validation split (split conformal prediction; Lei et al. 2018, doi:10.1080/01621459.2017.1307116), so a
-band holds its share of all simulations that are drawn as those were, whatever the errors' distribution.
-"""
-
-import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
-from raptor.surrogate.novelty import Novelty
+from raptor.core.errors import RaptorError
+from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.metrics import without_sign
+from raptor.fields.shape import density_threshold, ratios_above
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import MouldImage
+from raptor.surrogate.bands import USUAL, Calibration, fit_scale, relative_spread
+from raptor.surrogate.inference import Surrogate, deviation
+from raptor.surrogate.out_of_distribution import Novelty, descriptors
 
-LEVELS = (0.5, 0.8, 0.95)
-USUAL = 0.99  # part of the validation samples that the flag lets pass
-TINY = 1e-9
-
-
-@dataclass(frozen=True)
-class Bands:
-    """Half widths (levels, ...) of bands that hold `LEVELS` of all simulations."""
-
-    half: NDArray[np.float32]
-
-    def hold(self, error: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Whether an error (...) lies within each band, (levels, ...)."""
-        return np.asarray(np.abs(error) <= self.half)
+EDGES = (0.8, 1.25)  # between which the edge of predicted tissues is sought
+PIXELS = 400  # of each sample, chosen at random within the depression
 
 
-@dataclass(frozen=True)
-class Scale:
-    """From spread to bands, of several quantities (n,).
+def calibrate(
+    surrogate: Surrogate,
+    stack: Path,
+    moulds: Mapping[str, Mould],
+    seed: int,
+    on_progress: Callable[[int], None] = lambda simulation: None,
+) -> Calibration:
+    """The calibration of a surrogate on a stack's validation split.
 
-    Parameters
-    ----------
-    floor : tuple of float
-        Part of sigma that no agreement of networks takes away, over `size`.
-    factors : tuple (levels, n)
-        Half width of each level's band over sigma.
+    Raises
+    ------
+    RaptorError
+        Where the stack has no validation sample.
     """
-
-    floor: tuple[float, ...]
-    factors: tuple[tuple[float, ...], ...]
-
-    def bands(self, spread: NDArray[np.floating], size: NDArray[np.floating]) -> Bands:
-        """Bands of quantities with a spread (n, ...) and size (n or 1, ...)."""
-        sigma = _sigma(np.array(self.floor), spread, size)
-        factors = np.array(self.factors).reshape(len(LEVELS), -1, *(1,) * (spread.ndim - 1))
-        return Bands((factors * sigma).astype(np.float32))
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """What was learnt of a surrogate's errors on the validation split.
-
-    Parameters
-    ----------
-    fields, shapes : Scale
-        Of the eight fields, and of A/A0 and w/w0.
-    disagreement : float
-        Of networks about density (`relative_spread`), that all but a hundredth of samples stay below.
-    novelty : Novelty
-        Distance to the training set.
-    edge : float
-        Where a tissue ends in predicted densities, over where it ends in simulated ones: predicted edges are
-        softer, so that the same threshold lies farther out.
-    """
-
-    fields: Scale
-    shapes: Scale
-    disagreement: float
-    novelty: Novelty
-    edge: float = 1.0
-
-    def disagreement_of(self, spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
-        """Disagreement of networks about density over what is usual."""
-        return relative_spread(spread, fields) / self.disagreement
-
-    def as_json(self) -> dict[str, Any]:
-        """As it stands in model.json; the points of the training set stand beside the weights."""
-        return {
-            "levels": LEVELS,
-            "fields": {"floor": self.fields.floor, "factors": self.fields.factors},
-            "shapes": {"floor": self.shapes.floor, "factors": self.shapes.factors},
-            "disagreement": self.disagreement,
-            "distance": self.novelty.usual,
-            "edge": self.edge,
-        }
-
-    @classmethod
-    def from_json(cls, content: dict[str, Any], points: NDArray[np.float32]) -> "Calibration":
-        """Read back what `as_json` gave."""
-        fields, shapes = (
-            Scale(tuple(part["floor"]), tuple(tuple(row) for row in part["factors"]))
-            for part in (content["fields"], content["shapes"])
+    table, threshold = read_table(stack), density_threshold(surrogate.layers, surrogate.pixels)
+    rows = table.rows("validation")
+    if not rows:
+        raise RaptorError(f"{stack} has no validation sample; raise design.validation")
+    points = np.stack([_descriptors(sample) for sample in read_samples(stack, table.rows("train"))])
+    novelty = Novelty(points.astype(np.float32))
+    fields: list[NDArray[np.floating]] = []
+    seen: list[Silhouette] = []
+    disagreements, distances = [], []
+    for sample in read_samples(stack, rows):
+        mould = moulds[sample.mould]
+        image = MouldImage(sample.depression.astype(bool), sample.tethers.astype(bool))
+        predicted, spread, of_members = surrogate.ensemble(image, sample.parameters, sample.n_cells)
+        rng = np.random.default_rng([seed, sample.simulation])
+        inside = np.flatnonzero(image.depression)
+        chosen = rng.choice(inside, PIXELS, replace=len(inside) < PIXELS)
+        error, wide, size = (
+            part.reshape(len(part), -1)[:, chosen].T
+            for part in (without_sign(predicted) - without_sign(sample.fields), spread, np.abs(predicted[:1]))
         )
-        novelty = Novelty(points, content["distance"])
-        return cls(fields, shapes, content["disagreement"], novelty, content.get("edge", 1.0))
+        fields.append(np.stack([error, wide, np.broadcast_to(size, error.shape)]))
+        true = ratios_above(sample.fields[0], image, mould, threshold)
+        seen.append(Silhouette(image, mould, true, predicted[0], of_members))
+        disagreements.append(relative_spread(spread, predicted))
+        distances.append(novelty.distance(_descriptors(sample)))
+        on_progress(sample.simulation)
+    edge = fit_edge(seen, threshold)
+    shapes = [each.errors(edge * threshold) for each in seen]
+    return Calibration(
+        fit_scale(*np.concatenate(fields, axis=1)),
+        fit_scale(*np.stack(shapes, axis=1)),
+        float(np.quantile(disagreements, USUAL)),
+        Novelty(novelty.points, float(np.quantile(distances, USUAL))),
+        edge,
+    )
 
 
-def relative_spread(spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
-    """Root mean square spread of density (8, y, x) over the deviation of density, in the image."""
-    return float(np.sqrt((spread[0] ** 2).mean(dtype=np.float64)) / (fields[0].std(dtype=np.float64) + TINY))
+@dataclass(frozen=True)
+class Silhouette:
+    """A tissue's true ratios (2,), and densities predicted by all networks (y, x) and by each (n, y, x)."""
+
+    image: MouldImage
+    mould: Mould
+    true: NDArray[np.float64]
+    predicted: NDArray[np.float32]
+    of_members: NDArray[np.float32]
+
+    def error(self, threshold: float) -> NDArray[np.float64]:
+        """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
+        return ratios_above(self.predicted, self.image, self.mould, threshold) - self.true
+
+    def errors(self, threshold: float) -> NDArray[np.float64]:
+        """Errors, spread over networks and sizes of both ratios, (3, 2)."""
+        of_each = [ratios_above(d, self.image, self.mould, threshold) for d in self.of_members]
+        return np.stack([self.error(threshold), deviation(np.array(of_each)), np.ones(2)])
 
 
-def fit_scale(error: NDArray[np.floating], spread: NDArray[np.floating], size: NDArray[np.floating]) -> Scale:
-    """The scale whose bands hold their share of errors (samples, n), of spreads and sizes alike.
+def fit_edge(seen: Sequence[Silhouette], threshold: float) -> float:
+    """The factor of the threshold at which A/A0 and w/w0 err least, by their mean absolute error.
 
-    The floor is half the root mean square error over that of size: enough for a band where networks
-    happen to agree, not so much that disagreement counts for nothing. NaN are left out.
+    Networks soften what they are not sure of: the contour of the simulated tissue's density lies outside
+    of the tissue in a softer image, and a higher one where the tissue ends.
     """
-    squares = [np.nanmean(part.astype(np.float64) ** 2, axis=0) for part in (error, size)]
-    floor = 0.5 * np.sqrt(squares[0] / (squares[1] + TINY))
-    ratio = np.abs(error) / _sigma(floor, np.moveaxis(spread, -1, 0), np.moveaxis(size, -1, 0)).T
-    factors = [[_conformal(column, level) for column in ratio.T] for level in LEVELS]
-    return Scale(tuple(float(v) for v in floor), tuple(tuple(row) for row in factors))
+
+    def cost(edge: float) -> float:
+        return float(np.nanmean([np.abs(each.error(edge * threshold)) for each in seen]))
+
+    return float(minimize_scalar(cost, bounds=EDGES, method="bounded", options={"xatol": 1e-3}).x)
 
 
-def _conformal(ratio: NDArray[np.floating], level: float) -> float:
-    """The least of ratios (samples,) that a further one does not exceed with probability `level`."""
-    ordered = np.sort(ratio[np.isfinite(ratio)])
-    rank = math.ceil((len(ordered) + 1) * level)
-    return float(ordered[min(rank, len(ordered)) - 1])
-
-
-def _sigma(
-    floor: NDArray[np.float64], spread: NDArray[np.floating], size: NDArray[np.floating]
-) -> NDArray[np.float64]:
-    """sqrt(spread^2 + (floor size)^2) of quantities (n, ...)."""
-    wide = floor.reshape(-1, *(1,) * (spread.ndim - 1))
-    return np.asarray(np.sqrt(spread.astype(np.float64) ** 2 + (wide * size) ** 2 + TINY**2))
+def _descriptors(sample: Sample) -> NDArray[np.float64]:
+    return descriptors(sample.depression, sample.tethers, sample.parameters)

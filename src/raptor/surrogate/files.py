@@ -12,15 +12,15 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from raptor import MODEL_VERSION
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.version import MODEL_VERSION
 from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
+from raptor.frame import pixel_centres
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import pixel_centres
 from raptor.parameters import CellParameters
-from raptor.surrogate.calibration import LEVELS, Calibration
+from raptor.surrogate.bands import LEVELS, Calibration
 from raptor.surrogate.inference import Prediction, Surrogate
 from raptor.surrogate.networks import Architecture, Generator
 from raptor.symmetry import FIELDS

@@ -12,18 +12,18 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 from raptor.condor.lattice import cast_sites
+from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import Scaling, scale_inputs
-from raptor.errors import RaptorError
-from raptor.morphology import density_threshold, ratios_above
+from raptor.fields.resample import pooled, refined
+from raptor.fields.shape import density_threshold, ratios_above
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import MouldImage, mould_image
 from raptor.parameters import CellParameters
-from raptor.resolution import pooled, refined
-from raptor.surrogate.calibration import Bands, Calibration
-from raptor.surrogate.feeding import apply, move_pixels
+from raptor.surrogate.bands import Bands, Calibration
+from raptor.surrogate.batches import apply, move_pixels
+from raptor.surrogate.constraints import average, project, signed, unsigned
 from raptor.surrogate.networks import Architecture, Generator
-from raptor.surrogate.novelty import descriptors
-from raptor.surrogate.physics import average, project, signed, unsigned
+from raptor.surrogate.out_of_distribution import descriptors
 from raptor.symmetry import FIELDS, Element
 
 BATCH = 16

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, l1_loss
 
-from raptor.surrogate.physics import SMALL, unsigned
+from raptor.surrogate.constraints import SMALL, unsigned
 
 LOSSES = ("l1", "relative")
 QUIET = 0.1  # part of the batch's variance that is added to each sample's: nothing is divided by noise

@@ -9,10 +9,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import INPUTS, Scaling
-from raptor.errors import RaptorError
-from raptor.surrogate.compact import MASKS, CompactUNet, ModulatedNorm, ParameterEmbedding
-from raptor.surrogate.physics import PhysicalFields
+from raptor.surrogate.constraints import PhysicalFields
+from raptor.surrogate.film_unet import MASKS, CompactUNet, ModulatedNorm, ParameterEmbedding
 from raptor.symmetry import FIELDS
 
 NETWORKS = ("pix2pix", "modulated", "compact", "fno")

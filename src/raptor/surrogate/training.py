@@ -13,12 +13,12 @@ import pandas as pd
 import torch
 from torch import Tensor, nn
 
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
 from raptor.dataset.examples import Example
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import INPUTS, Scaling
-from raptor.errors import RaptorError
-from raptor.files import atomic_path
-from raptor.surrogate.feeding import Batches, Feeder, fit_on
+from raptor.surrogate.batches import Batches, Feeder, fit_on
 from raptor.surrogate.losses import discriminator_loss, generator_loss
 from raptor.surrogate.networks import Architecture, Discriminator, Generator, initialise
 from raptor.symmetry import FIELDS

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from raptor.dataset.same import differences
+from raptor.dataset.compare import differences
 from tests.workflow.conftest import ROOT
 from tests.workflow.test_end_to_end import variant
 

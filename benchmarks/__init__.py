@@ -1,0 +1,1 @@
+"""How fast the simulator is, against baselines in the same run: `python -m benchmarks`."""

@@ -1,1 +1,0 @@
-"""How fast the simulator is, against baselines in the same run: `python -m raptor.benchmark`."""

@@ -1,0 +1,233 @@
+"""One simulation, at the accuracy that a user asks for."""
+
+import re
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from raptor.condor.anneal import anneal
+from raptor.condor.contract import Contraction, contract, refine, steps_to
+from raptor.condor.energy import cell_tension, inverted_fraction, objective
+from raptor.condor.minimise import Minimum
+from raptor.condor.system import System, build_system, cast_state
+from raptor.condor.walls import NO_WALLS
+from raptor.core.errors import RaptorError
+from raptor.moulds.geometry import Mould
+from raptor.parameters import CellParameters, NetworkModel
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """A solver and its tolerances.
+
+    Parameters
+    ----------
+    solver : str
+        Name written to files.
+    contraction : Contraction
+        How closely the contraction is followed, and its tolerance.
+    rounds, round_sweeps : int
+        Rounds of agitation and minimisation after the contraction, and the sweeps of each.
+    anneal_sweeps : int
+        Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
+    minimised : bool
+        Whether the last state is a minimum; a bare anneal's is not.
+    precision : str
+        "float64" or "float32".
+    """
+
+    solver: str
+    contraction: Contraction
+    rounds: int = 0
+    round_sweeps: int = 0
+    anneal_sweeps: int = 0
+    minimised: bool = True
+    precision: str = "float64"
+
+    @property
+    def contracts_alone(self) -> bool:
+        """Whether it neither anneals nor goes on in rounds: what batches of tissues can do."""
+        return not (self.anneal_sweeps or self.rounds)
+
+
+ACCURACIES: dict[str, Accuracy] = {
+    # Largest gradient left, over Delta: 0.03, 0.02, 0.001 kappa0 l0.
+    "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, 3e-2, 1500)),
+    "standard": Accuracy("contract", Contraction(0.3, 50, 5e-3, 2e-2, 10000)),
+    "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), rounds=5, round_sweeps=300),
+}
+"""What `accuracy: draft | standard | reference` means."""
+
+ALLOWED = "draft, standard, reference, anneal-SWEEPS and anneal-SWEEPS-minimised, each also with -float32"
+
+
+def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
+    """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
+    last = Contraction(1.0, 0, -1.0, 1e-3, 30000 if minimised else 1)
+    return Accuracy("anneal", last, anneal_sweeps=sweeps, minimised=minimised)
+
+
+def accuracy_named(name: str) -> Accuracy:
+    """The accuracy of a name: a level, or anneal-SWEEPS, each with -float32; see ALLOWED.
+
+    Raises
+    ------
+    RaptorError
+        Where there is no such accuracy.
+    """
+    base = name.removesuffix("-float32")
+    anneal_of = re.fullmatch(r"anneal-([1-9]\d{0,8}|[1-9]e[1-8])(-minimised)?", base)
+    if anneal_of:
+        accuracy = annealed(int(float(anneal_of[1])), bool(anneal_of[2]))
+    elif base in ACCURACIES:
+        accuracy = ACCURACIES[base]
+    else:
+        raise RaptorError(f"accuracy is '{name}'; allowed are {ALLOWED}")
+    return replace(accuracy, precision="float32") if name != base else accuracy
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated tissue and how it was reached.
+
+    Parameters
+    ----------
+    sites, positions : ndarray (cells, 3)
+        Cast and final positions, l0.
+    orientation : ndarray (cells, 3)
+        Unit vectors; s and -s are the same cell.
+    tension : ndarray (cells,)
+        Mean over each cell's bonds, kappa0 l0.
+    energy, wall_energy, contact_energy : float
+        Of the bonds, of the walls, and of the contacts that keep bonds from reversing, kappa0 l0^2.
+        Where the last is not zero, the state is a minimum with those contacts, not without.
+    gradient : float
+        Largest component of the gradient left, contacts included, by position or by orientation
+        over Delta (at least 0.02), kappa0 l0.
+    converged : bool
+        Whether the gradient fell below the tolerance; never true for a bare anneal.
+    inverted_fraction : float
+        Share of bonds whose direction reversed.
+    gradient_evaluations, sweeps : int
+        Work done.
+    wall_time : float
+        Seconds.
+    """
+
+    sites: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    orientation: NDArray[np.float64]
+    tension: NDArray[np.float64]
+    energy: float
+    wall_energy: float
+    contact_energy: float
+    gradient: float
+    converged: bool
+    inverted_fraction: float
+    gradient_evaluations: int
+    sweeps: int
+    wall_time: float
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.sites)
+
+    def __str__(self) -> str:
+        state = "converged" if self.converged else "NOT converged"
+        return f"{self.cells} cells, energy {self.energy:.5g}, {state}, {self.wall_time:.2f} s"
+
+
+def simulate(
+    mould: Mould,
+    parameters: CellParameters,
+    model: NetworkModel,
+    accuracy: str | Accuracy = "standard",
+    seed: int = 0,
+) -> Simulation:
+    """Cast a mould, let it contract, and return the tissue.
+
+    The result hangs on the arguments alone; the seed sets the first orientations and every
+    trial move.
+
+    Raises
+    ------
+    RaptorError
+        Where the mould holds no cell or the accuracy has no such name.
+    """
+    if isinstance(accuracy, str):
+        accuracy = accuracy_named(accuracy)
+    started = time.perf_counter()
+    rng = np.random.default_rng(seed)
+    system = build_system(mould, parameters, model, accuracy.precision)
+    lattice = system.lattice
+    minimum, sweeps = _solve(system, parameters.delta, accuracy, rng)
+    state = minimum.state.astype(np.float64)
+    touching = _contact_energy(minimum, system, parameters.delta)
+    if not mould.tethers:
+        state = undrifted(state, lattice.sites, mould)
+    return Simulation(
+        sites=lattice.sites,
+        positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
+        orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),
+        tension=cell_tension(state, lattice, parameters.delta, model.tension),
+        energy=minimum.energy,
+        wall_energy=minimum.walled - touching,
+        contact_energy=touching,
+        gradient=minimum.gradient,
+        converged=minimum.converged and accuracy.minimised,
+        inverted_fraction=inverted_fraction(state, lattice),
+        gradient_evaluations=minimum.evaluations,
+        sweeps=sweeps,
+        wall_time=time.perf_counter() - started,
+    )
+
+
+def _contact_energy(minimum: Minimum, system: System, delta: float) -> float:
+    """Energy of the contacts that a minimum was found with."""
+    if minimum.contact == 0:
+        return 0.0
+    return objective(minimum.state, system.network, NO_WALLS, delta, minimum.contact)[1]
+
+
+def undrifted(state: NDArray[np.float64], sites: NDArray[np.float64], mould: Mould) -> NDArray[np.float64]:
+    """The state moved and turned in the plane as a whole, so that it lies as it was cast.
+
+    Nothing holds a gel without tethers: moved or turned with its cells it has the same energy.
+    Where walls are touched, before or after, it stays as it is.
+    """
+    blocks = state.reshape(6, -1).copy()
+    cast, found = sites[:, :2] - sites[:, :2].mean(axis=0), blocks[:2].T - blocks[:2].mean(axis=1)
+    cross = cast.T @ found
+    angle = np.arctan2(cross[1, 0] - cross[0, 1], cross[0, 0] + cross[1, 1])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    blocks[:2] = turn @ found.T + sites[:, :2].mean(axis=0)[:, None]
+    blocks[3:5] = turn @ blocks[3:5]
+    planes = (state.reshape(6, -1)[:2], blocks[:2])
+    free = all(mould.forbidden_depth(plane.T).max() < 0 for plane in planes)
+    return blocks.ravel() if free else state
+
+
+def _solve(system: System, delta: float, accuracy: Accuracy, rng: Generator) -> tuple[Minimum, int]:
+    """Run an accuracy's solvers one after another; returns the minimum and the sweeps made."""
+    state = cast_state(system.lattice.sites, rng).astype(accuracy.precision)
+    sweeps = accuracy.anneal_sweeps
+    if sweeps:
+        annealed = anneal(state, system.order, system.sublattices, system.walls, delta, rng, sweeps=sweeps)
+        state = annealed.state
+    minimum = contract(state, system, delta, accuracy.contraction, rng)
+    minimum = refine(
+        minimum,
+        system,
+        delta,
+        accuracy.contraction,
+        rng,
+        rounds=accuracy.rounds,
+        sweeps=accuracy.round_sweeps,
+    )
+    sweeps += accuracy.rounds * accuracy.round_sweeps
+    sweeps += len(steps_to(delta, accuracy.contraction.shortening)) * accuracy.contraction.sweeps
+    return minimum, sweeps

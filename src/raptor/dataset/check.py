@@ -1,0 +1,307 @@
+"""`raptor check`: the rules that every file of a data set must satisfy (docs/data.md).
+
+Each check yields faults, one sentence each; a data set without faults yields none.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from raptor.condor.energy import cell_tension, objective
+from raptor.condor.lattice import cast_sites
+from raptor.condor.network import build_network
+from raptor.condor.walls import NO_WALLS
+from raptor.core.errors import RaptorError
+from raptor.dataset.design import Run, read_design
+from raptor.dataset.examples import mould_images, read_examples, training_scaling
+from raptor.dataset.netcdf import open_file
+from raptor.dataset.scaling import read_scaling
+from raptor.dataset.shards import Record, Shard, read_shard
+from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
+from raptor.fields.raster import DEEP
+from raptor.frame import pixel_size
+from raptor.moulds.geojson import moulds_by_id, read_moulds
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
+from raptor.moulds.reading import read_mould
+from raptor.symmetry import FIELDS
+
+RELATIVE = 1e-4  # of recomputed values: storage is float32
+WALL_YIELD = 0.1  # l0; how far a soft wall gives way
+
+
+def check(path: Path, part: float = 1.0) -> list[str]:
+    """Check a results folder, or any file of one: shard, stack, prediction, table, moulds.
+
+    Moulds may be GeoJSON, SVG or PNG.
+    Energy, tension and fields of a folder are computed again for a random `part` of its simulations.
+
+    Returns
+    -------
+    list of str
+        One sentence a fault; empty where all is well.
+
+    Raises
+    ------
+    RaptorError
+        Where there is nothing at the path that can be checked.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return list(_check_folder(path, part))
+    if path.suffix.lower() in (".geojson", ".svg", ".png"):
+        return _fault_of(_cast_moulds, path)
+    if path.suffix == ".csv":
+        return _fault_of(read_examples if path.name == "examples.csv" else read_design, path)
+    if path.suffix == ".json":
+        return _fault_of(read_scaling, path)
+    with open_file(path) as file:
+        names = set(file.variables)
+    if "row_size" in names:
+        return list(check_shard(path))
+    if {"fields", "n_cells"} <= names:
+        return list(check_stack(path))
+    if {"fields", "area_ratio"} <= names:
+        with open_file(path) as file:
+            return [*_check_variables(file, path.name), *_check_field_names(file, path.name)]
+    raise RaptorError(f"{path} is neither a shard nor fields; nothing to check")
+
+
+def _cast_moulds(path: Path) -> None:
+    """Read a file's moulds, and cast two layers of each: a mould without cells is of no use."""
+    for mould in read_moulds(path) if path.suffix.lower() == ".geojson" else [read_mould(path)]:
+        cast_sites(mould, layers=2)
+
+
+def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
+    """What reading a file finds wrong with it."""
+    try:
+        read(path)
+    except RaptorError as error:
+        return [str(error)]
+    return []
+
+
+def _check_folder(folder: Path, part: float) -> Iterator[str]:
+    stack = folder / "dataset" / "fields.nc"
+    if not stack.is_file():
+        raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder or a file")
+    runs = read_design(folder / "design" / "design.csv")
+    moulds = moulds_by_id(folder / "design" / "moulds.geojson")
+    yield from check_design(runs, moulds)
+    yield from check_stack(stack)
+    with open_file(stack) as file:
+        names = str(getattr(file, "shards", "")).split()
+    shards = [folder / "simulations" / name for name in names]
+    ids = np.array([run.simulation for run in runs])
+    chosen = np.random.default_rng().permutation(ids)[: max(1, round(part * len(ids)))]
+    yield from check_against_shards(stack, shards, runs, moulds, {int(i) for i in chosen})
+    yield from check_examples(folder / "dataset", stack)
+
+
+def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
+    """Ids and seeds are unique, every mould is found and used once."""
+    for what, values in (
+        ("simulation id", [str(run.simulation) for run in runs]),
+        ("seed", [str(run.seed) for run in runs]),
+        ("mould", [run.mould for run in runs]),
+    ):
+        if len(set(values)) < len(values):
+            twice = next(v for v in values if values.count(v) > 1)
+            splits = sorted({run.split for run, v in zip(runs, values, strict=True) if v == twice})
+            yield f"design.csv: {what} {twice} stands in two rows (splits: {', '.join(splits)})"
+    for run in runs:
+        if run.mould not in moulds:
+            yield f"design.csv: mould {run.mould} of simulation {run.simulation} is not in moulds.geojson"
+
+
+def check_shard(path: Path, chosen: set[int] | None = None) -> Iterator[str]:
+    """Energy and tension recomputed from positions and orientations are the stored ones.
+
+    Of the `chosen` simulations, or of all.
+    """
+    try:
+        shard = read_shard(path)
+        with open_file(path) as file:
+            yield from _check_variables(file, Path(path).name)
+    except RaptorError as error:
+        yield str(error)
+        return
+    for record in shard.records:
+        if chosen is None or record.simulation in chosen:
+            yield from _check_record(record, shard, Path(path).name)
+
+
+def _check_record(record: Record, shard: Shard, file: str) -> Iterator[str]:
+    where = f"{file}: simulation {record.simulation}"
+    arrays = ("sites", "positions", "orientation", "tension")
+    broken = [name for name in arrays if not np.isfinite(getattr(record, name)).all()]
+    if broken or not np.isfinite(record.energy):
+        yield f"{where}: NaN or infinity in {', '.join(broken) or 'energy'}"
+        return
+    if np.abs(np.linalg.norm(record.orientation, axis=1) - 1).max() > RELATIVE:
+        yield f"{where}: an orientation is not a unit vector"
+        return
+    lattice = record.lattice(shard.model)
+    delta = record.parameters.delta
+    energy = objective(record.state, build_network(lattice), NO_WALLS, delta)[0]
+    if abs(energy - record.energy) > RELATIVE * abs(energy) + 1e-9 * lattice.bonds:
+        yield f"{where}: energy is {record.energy:.6g}, recomputed {energy:.6g}"
+    tension = cell_tension(record.state, lattice, delta, shard.model.tension)
+    worst = np.abs(tension - record.tension).max()
+    if worst > RELATIVE * np.abs(tension).max() + 1e-5:
+        yield f"{where}: tension differs from the recomputed by up to {worst:.3g}"
+
+
+def check_stack(path: Path) -> Iterator[str]:
+    """Invariants of fields and masks; no mould, in any of its eight images, in two splits."""
+    with open_file(path) as file:
+        yield from _check_variables(file, Path(path).name, images=False)
+        yield from _check_field_names(file, Path(path).name)
+    table = read_table(path)
+    first_seen: dict[bytes, tuple[int, str]] = {}  # not samples: they would all stay in memory
+    for sample in read_samples(path, range(len(table.split))):
+        where = f"{Path(path).name}: simulation {sample.simulation}"
+        yield from _check_fields(sample, where)
+        for image in mould_images(sample):
+            other, split = first_seen.setdefault(image, (sample.simulation, sample.split))
+            if split != sample.split:
+                yield (
+                    f"{where} ({sample.split}) has the mould of simulation {other} "
+                    f"({split}), as it is or turned or mirrored: one mould in two splits"
+                )
+                break
+
+
+def _check_field_names(file: Any, name: str) -> Iterator[str]:
+    if [str(v) for v in file["field"][:]] != list(FIELDS):
+        yield f"{name}: the fields are not {', '.join(FIELDS)} in this order"
+
+
+def _check_variables(file: Any, name: str, *, images: bool = True) -> Iterator[str]:
+    """Attributes of the file and its variables, and that every number is finite.
+
+    Without `images` the stack's large variables are left to the check of each sample.
+    """
+    for attribute in ("title", "source", "history", "references", "configuration"):
+        if not hasattr(file, attribute):
+            yield f"{name}: attribute {attribute} is missing"
+    for variable in file.variables.values():
+        if not (hasattr(variable, "long_name") and hasattr(variable, "units")):
+            yield f"{name}: variable {variable.name} lacks long_name or units"
+        if variable.dtype is not str and (images or variable.ndim < 3):
+            values = variable[:]
+            # A mould without material on its central section has no width ratio.
+            if variable.name != "width_ratio" and not np.isfinite(values).all():
+                yield f"{name}: NaN or infinity in {variable.name}"
+
+
+def _check_fields(sample: Sample, where: str) -> Iterator[str]:
+    fields = {name: field.astype(np.float64) for name, field in zip(FIELDS, sample.fields, strict=True)}
+    for name, field in fields.items():
+        if not np.isfinite(field).all():
+            yield f"{where}: NaN or infinity in {name}"
+            return
+    density = fields["density"]
+    small = 1e-5 * density.max() + 1e-12
+    trace = fields["sxsx"] + fields["sysy"] + fields["szsz"]
+    if np.abs(trace - density).max() > small:
+        yield f"{where}: sxsx + sysy + szsz is not density (off by {np.abs(trace - density).max():.3g})"
+    if abs(density.sum() / sample.n_cells - 1) > 1e-3:
+        yield f"{where}: density sums to {density.sum():.6g}, the tissue has {sample.n_cells} cells"
+    if density.min() < 0:
+        yield f"{where}: density is negative ({density.min():.3g})"
+    for a, b in (("x", "y"), ("x", "z"), ("y", "z")):
+        product = fields[f"s{a}s{a}"] * fields[f"s{b}s{b}"]
+        if (np.abs(fields[f"s{a}s{b}"]) > np.sqrt(np.maximum(product, 0)) + small).any():
+            yield f"{where}: |s{a}s{b}| exceeds sqrt(s{a}s{a} s{b}s{b}): orientation tensor not positive"
+    if (sample.depression & sample.tethers).any():
+        yield f"{where}: depression and tethers overlap"
+    away = distance_transform_edt(sample.depression == 0) * pixel_size(density.shape[-1])
+    deep = away > DEEP + WALL_YIELD + pixel_size(density.shape[-1])
+    if (density[deep] > small).any():
+        yield f"{where}: density of {density[deep].max():.3g} deep in a tether or outside the depression"
+
+
+def check_against_shards(
+    stack: Path, shards: list[Path], runs: list[Run], moulds: dict[str, Mould], chosen: set[int]
+) -> Iterator[str]:
+    """Fields, masks and parameters of a stack are those of the simulations it was made from.
+
+    Every simulation is looked for; those `chosen` are computed again.
+    """
+    table = read_table(stack)
+    rows = {int(simulation): row for row, simulation in enumerate(table.simulation)}
+    by_id = {run.simulation: run for run in runs}
+    with open_file(stack) as file:
+        stated = {int(simulation) for simulation in str(getattr(file, "missing", "")).split()}
+    for missing in sorted(set(by_id) ^ set(rows) ^ stated):
+        yield f"simulation {missing} is in only one of design.csv and {Path(stack).name}"
+    uncovered = set(rows)
+    for path in shards:
+        yield from check_shard(path, chosen)
+        try:
+            shard = read_shard(path)
+        except RaptorError:
+            continue  # named by check_shard
+        for record in shard.records:
+            uncovered.discard(record.simulation)
+            run = by_id.get(record.simulation)
+            if record.simulation not in rows or run is None or run.mould not in moulds:
+                yield f"{path.name}: simulation {record.simulation} or its mould is not in the design"
+                continue
+            if record.simulation not in chosen:
+                continue
+            (sample,) = read_samples(stack, [rows[record.simulation]])
+            yield from _compare(sample, record, run, moulds[run.mould])
+    for simulation in sorted(uncovered):
+        yield f"simulation {simulation} of {Path(stack).name} is in no readable shard"
+
+
+def _compare(sample: Sample, record: Record, run: Run, mould: Mould) -> Iterator[str]:
+    where = f"simulation {sample.simulation}"
+    stored = (sample.mould, sample.split, sample.n_cells, sample.parameters)
+    if stored != (run.mould, run.split, len(record.positions), run.parameters) or (
+        record.parameters != run.parameters or record.seed != run.seed
+    ):
+        yield f"{where}: mould, split, cells, seed or parameters differ between design, shard and stack"
+    image = mould_image(mould, sample.fields.shape[-1])
+    if (image.depression != sample.depression).any() or (image.tethers != sample.tethers).any():
+        yield f"{where}: its masks are not those of mould {run.mould}"
+    fields = record_fields(record, sample.fields.shape[-1])
+    for name, stored_field, field in zip(FIELDS, sample.fields, fields, strict=True):
+        if np.abs(stored_field - field).max() <= RELATIVE * np.abs(field).max():
+            continue
+        if np.abs(stored_field + field).max() <= RELATIVE * np.abs(field).max():
+            yield f"{where}: {name} has the opposite sign of the field recomputed from the shard"
+        else:
+            yield f"{where}: {name} differs from the field recomputed from the shard"
+
+
+def check_examples(folder: Path, stack: Path) -> Iterator[str]:
+    """Examples exist, are listed once, and come from no test sample; scaling is the training split's."""
+    table = read_table(stack)
+    try:
+        examples = read_examples(folder / "examples.csv")
+        scaling = read_scaling(folder / "normalisation.json")
+    except RaptorError as error:
+        yield str(error)
+        return
+    if len(set(examples)) < len(examples):
+        yield "examples.csv: an example is listed twice"
+    for example in examples:
+        if not (0 <= example.sample < len(table.split) and 0 <= example.element < 8):
+            yield f"examples.csv: {example} is not in {Path(stack).name}"
+        elif table.split[example.sample] == "test":
+            yield f"examples.csv: sample {example.sample} is held out for test"
+    wanted = training_scaling(stack)
+    if not np.allclose(_flat(scaling), _flat(wanted), rtol=1e-6, equal_nan=True):
+        yield "normalisation.json: the constants are not those of the training split"
+
+
+def _flat(scaling: object) -> NDArray[np.float64]:
+    return np.concatenate([getattr(scaling, "offset"), getattr(scaling, "scale")])  # noqa: B009

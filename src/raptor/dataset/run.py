@@ -1,0 +1,113 @@
+"""Simulating the runs of a design, on the processor or on a GPU."""
+
+import logging
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from raptor.condor.simulate import Simulation, accuracy_named, simulate
+from raptor.core.errors import RaptorError
+from raptor.dataset.design import Run
+from raptor.moulds.geometry import Mould
+from raptor.parameters import NetworkModel
+
+if TYPE_CHECKING:
+    from raptor.condor.gpu.layout import Cast
+
+log = logging.getLogger("raptor")
+
+FEW = 16  # runs that are cast without further processes
+
+
+def simulate_shard(
+    runs: list[Run],
+    moulds: dict[str, Mould],
+    model: NetworkModel,
+    accuracy: str,
+    device: str = "cpu",
+    on_progress: Callable[[Run, Simulation | str], None] = lambda run, outcome: None,
+) -> tuple[dict[int, Simulation], dict[int, str]]:
+    """Simulate runs; returns simulations and reasons of failure, by id.
+
+    On the processor one after another; on a GPU many at once, where the accuracy contracts and does no
+    more. A run that fails is tried once more on the processor, then given up, and the others go on. Want of
+    memory or disk is no run's fault and is raised, for the workflow to try the whole shard again.
+    `on_progress` is told of each run its simulation or the reason why there is none.
+    """
+    simulations, failures = {}, {}
+    if device != "cpu" and accuracy_named(accuracy).contracts_alone:
+        simulations = _simulate_together(runs, moulds, model, accuracy, device, on_progress)
+    for run in runs:
+        if run.simulation in simulations:
+            continue
+        outcome = _simulate(run, moulds, model, accuracy)
+        if isinstance(outcome, str):  # once more: not every cause of a failure stays
+            outcome = _simulate(run, moulds, model, accuracy)
+        if isinstance(outcome, str):
+            failures[run.simulation] = outcome
+        else:
+            simulations[run.simulation] = outcome
+        on_progress(run, outcome)
+    return simulations, failures
+
+
+def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Simulation | str:
+    """The simulation of a run, or why it failed."""
+    try:
+        made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
+    except (RaptorError, ArithmeticError, np.linalg.LinAlgError) as error:
+        log.exception("simulation %d failed", run.simulation)
+        return f"{type(error).__name__}: {error}"
+    if not _is_finite(made):
+        return "the solver met numbers that are not finite"
+    return made
+
+
+def _simulate_together(
+    runs: list[Run],
+    moulds: dict[str, Mould],
+    model: NetworkModel,
+    accuracy: str,
+    device: str,
+    on_progress: Callable[[Run, Simulation | str], None],
+) -> dict[int, Simulation]:
+    """Simulations of runs in one batch, by id; without those that cannot be cast or do not stay finite."""
+    import torch  # here: a job on the processor need not wait for it
+
+    from raptor.condor.gpu.contract import BatchSolver, Task
+
+    found = zip(runs, _cast_all([moulds[run.mould] for run in runs], model), strict=True)
+    cast = [(run, tissue) for run, tissue in found if tissue is not None]
+    tasks = [Task(moulds[run.mould], tissue, run.parameters, run.seed) for run, tissue in cast]
+    simulations = {}
+    for number, simulation in BatchSolver(tasks, model, accuracy, torch.device(device)).run():
+        run = cast[number][0]
+        if _is_finite(simulation):
+            simulations[run.simulation] = simulation
+            on_progress(run, simulation)
+    return simulations
+
+
+def _cast_all(moulds: list[Mould], model: NetworkModel) -> list["Cast | None"]:
+    """Moulds cast for a batch, None where one cannot be; many by all processors, before a GPU is touched."""
+    if len(moulds) <= FEW:
+        return [_cast(mould, model) for mould in moulds]
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+        return list(pool.map(_cast, moulds, [model] * len(moulds), chunksize=8))
+
+
+def _cast(mould: Mould, model: NetworkModel) -> "Cast | None":
+    from raptor.condor.gpu.layout import cast
+
+    try:
+        return cast(mould, model)
+    except RaptorError:
+        return None  # said again, and recorded, when the processor tries
+
+
+def _is_finite(simulation: Simulation) -> bool:
+    return bool(np.isfinite(simulation.energy) and np.isfinite(simulation.positions).all())

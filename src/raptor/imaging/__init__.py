@@ -1,0 +1,55 @@
+"""Measuring an experiment: from a picture of a tissue in its mould to its outline, area and width."""
+
+from collections.abc import Sequence
+
+from raptor.core.errors import RaptorError
+from raptor.imaging.pictures import Picture, as_picture, read_picture
+from raptor.imaging.registration import Registration, aligned, from_landmarks, parse_landmarks
+from raptor.imaging.rim import find_rim
+from raptor.imaging.tissue import Measurement, Tissue, measure, tissue_named
+from raptor.moulds import Mould
+
+__all__ = [
+    "Measurement",
+    "Picture",
+    "Registration",
+    "Tissue",
+    "aligned",
+    "as_picture",
+    "find_rim",
+    "from_landmarks",
+    "measure",
+    "parse_landmarks",
+    "read_picture",
+    "register",
+    "tissue_named",
+]
+
+
+def register(
+    picture: Picture,
+    mould: Mould,
+    landmarks: Sequence[str] = (),
+    is_aligned: bool = False,
+    mirrored: bool = False,
+) -> Registration:
+    """Register a picture by landmarks where given, as aligned where told so, otherwise by the rim.
+
+    Landmarks are in pixels of the file.
+
+    Raises
+    ------
+    RaptorError
+        Where the two are given together, a mask comes without either, or the registration fails.
+    """
+    if landmarks and is_aligned:
+        raise RaptorError("give landmarks or --aligned, not both")
+    if landmarks:
+        pixels, points = parse_landmarks(landmarks, mould)
+        reduced = (pixels - (picture.reduction - 1) / 2) / picture.reduction
+        return from_landmarks(reduced, points, mirrored)
+    if is_aligned:
+        return aligned(picture.values.shape)
+    if picture.mask:
+        raise RaptorError("a mask shows no rim to register by; give --aligned or two --landmark at least")
+    return find_rim(picture.values, mould, mirrored)

@@ -1,0 +1,93 @@
+"""A picture to check a measurement by eye."""
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.fields.shape import central_section
+from raptor.imaging.pictures import Picture
+from raptor.imaging.registration import Registration
+from raptor.imaging.tissue import Measurement
+from raptor.moulds import Mould
+from raptor.plotting.drawing import PREDICTED, SIMULATED, STYLED, THIRD, new_figure
+
+MOULD, OUTLINE, SECTION = "#4fb3ff", "#ff3b30", "#ffd60a"  # told apart on grey
+
+
+@STYLED
+def overlay_figure(picture: Picture, mould: Mould, measurement: Measurement) -> Figure:
+    """The picture under mould, outline and central section; brightness in the depression, threshold."""
+    figure = new_figure(9.0, 4.2)
+    axes, histogram = figure.subplots(1, 2, width_ratios=[1.7, 1])
+    registration = measurement.registration
+    axes.imshow(picture.values, cmap="gray")
+    for number, tether in enumerate(mould.tethers, start=1):
+        _draw(axes, tether.polygon.exterior, registration, MOULD)
+        centre = registration.to_pixels(shapely.get_coordinates(tether.polygon.centroid))[0]
+        axes.annotate(str(number), centre, color=MOULD, fontsize=7, ha="center", va="center")
+    _draw(axes, mould.outline.exterior, registration, MOULD, label="mould")
+    section = central_section(mould).intersection(mould.outline)
+    _draw(axes, section, registration, SECTION, linestyle=":", label="central section")
+    for ring in _rings(measurement.outline):
+        _draw(axes, ring, registration, OUTLINE)
+    for part in shapely.get_parts(section.intersection(measurement.outline)):
+        _draw(axes, part, registration, SECTION, linewidth=2)
+    axes.plot([], [], color=OUTLINE, label="tissue")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0), ncols=3, fontsize=7, frameon=False)
+    axes.set(xticks=[], yticks=[], xlim=(0, picture.values.shape[1]), ylim=(picture.values.shape[0], 0))
+    residual = "" if np.isnan(registration.residual) else f", residual {registration.residual:.2f} $l_0$"
+    axes.set_title(
+        f"$A/A_0$ = {measurement.area_ratio:.3f}, $w/w_0$ = {measurement.width_ratio:.3f}\n"
+        f"registered by {registration.method}{residual}"
+    )
+    _draw_histogram(histogram, measurement)
+    return figure
+
+
+def write_overlay(path: Path, picture: Picture, mould: Mould, measurement: Measurement) -> None:
+    """Write the overlay as PNG.
+
+    Raises
+    ------
+    RaptorError
+        Where the path has another ending or cannot be written.
+    """
+    if path.suffix.lower() != ".png":
+        raise RaptorError(f"overlay {path} must end in .png")
+    figure = overlay_figure(picture, mould, measurement)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=110, metadata={"Software": None})
+
+
+def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
+    seen = measurement.brightness[measurement.read]
+    bright = measurement.tissue.value == "bright"
+    sides: dict[str, NDArray[np.float64]] = {
+        "tissue": seen[(seen > measurement.threshold) == bright],
+        "floor": seen[(seen > measurement.threshold) != bright],
+    }
+    bins = np.linspace(seen.min(), seen.max(), 80)
+    for (name, values), colour in zip(sides.items(), (PREDICTED, SIMULATED), strict=True):
+        axes.hist(values, bins=list(bins), color=colour, label=name)
+    axes.axvline(measurement.threshold, color=THIRD, ls="--", label=f"threshold {measurement.threshold:.3g}")
+    axes.set(
+        xlabel="brightness over that of the plate, light evened", ylabel="pixels of the depression", yticks=[]
+    )
+    axes.legend(frameon=False, fontsize=7)
+
+
+def _draw(
+    axes: Axes, line: shapely.Geometry, registration: Registration, colour: str, **style: object
+) -> None:
+    options = {"linewidth": 0.9, "color": colour} | style
+    axes.plot(*registration.to_pixels(shapely.get_coordinates(line)).T, **options)  # type: ignore[arg-type]
+
+
+def _rings(shape: shapely.Geometry) -> list[shapely.LinearRing]:
+    return [ring for part in shapely.get_parts(shape) for ring in (part.exterior, *part.interiors)]

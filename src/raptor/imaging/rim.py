@@ -1,0 +1,249 @@
+"""Registration by the rim: the edge of the depression, which looks unlike the plate around it.
+
+What is not plate gives a first position, size and direction; then edges are sought across the
+outline and the tethers as they would lie in the picture, and the similarity is fitted to them (the
+search of active shape models: Cootes, Taylor, Cooper and Graham 1995, Comput. Vis. Image Underst. 61, 38).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.ndimage import (
+    binary_closing,
+    binary_erosion,
+    binary_fill_holes,
+    binary_opening,
+    label,
+    map_coordinates,
+)
+from scipy.optimize import least_squares
+from scipy.signal import find_peaks
+from skimage.measure import find_contours
+from skimage.segmentation import watershed
+
+from raptor.core.errors import RaptorError
+from raptor.imaging.illumination import find_plate, log_brightness
+from raptor.imaging.registration import Registration
+from raptor.moulds import Mould
+
+SMOOTHING = 1.5  # pixels
+ANGLES = 120  # directions tried
+SPACING = 0.25  # l0, between points on the mould's edges
+CORNER = 0.6  # l0 around a corner, where blur moves the edge
+WIDE, CLOSE = (2.5, 1.0, 1.0), (0.6, 0.4, 0.4)  # l0 to either side in which an edge is sought, in turn
+BLURRED = 6  # pixels in which the rim's slope from plate to floor lies
+GAP = 4  # pixels; what looks like plate and is as narrow is no plate
+EDGE = 6.0  # times the plate's slopes: the least slope of an edge
+MIN_OVERLAP = 0.85, 0.95  # of the region found and the outline, before and after the fit
+MIN_SEEN = 0.6  # of the rim
+NEAR = 0.3  # l0; an edge counts as the mould's within it
+MAX_RESIDUAL = 0.1  # l0, root mean square of the edges that count
+BAND = 0.9  # l0 to either side of the rim in which there may be no second edge
+BAND_PART = 0.35  # of the rim, along which there is one
+SECOND_EDGE = 0.2  # of the rim's slope
+MIN_SCALE = 8.0  # pixels per l0; below it a tissue near the rim is not told from it
+ADVICE = "show the whole mould with plate around it, try --mirrored, or give --landmark or --aligned"
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Points (n, 2) on the mould's edges, their normals (n, 2), and which are the rim's; l0."""
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    rim: NDArray[np.bool_]
+
+    def of_rim(self) -> "Edges":
+        """Those of the rim alone."""
+        return Edges(self.points[self.rim], self.normals[self.rim], self.rim[self.rim])
+
+
+def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) -> Registration:
+    """Register a photograph (row, column) by the rim of the depression.
+
+    Raises
+    ------
+    RaptorError
+        Where no rim is seen, or what is seen does not have the mould's shape.
+    """
+    plate, flat, _ = find_plate(log_brightness(values, SMOOTHING))
+    # Of brightness itself, for the steepest slope of its logarithm lies on an edge's dark side.
+    even = np.exp(flat)
+    slopes = np.hypot(*np.gradient(even))
+    region = _region(plate, slopes)
+    polygon = _as_polygon(region)
+    found = _start(polygon, mould, mirrored)
+    edges = mould_edges(mould)
+    # First to the region's boundary alone: a tissue near the rim has stronger edges.
+    rim = edges.of_rim()
+    for reach in WIDE:
+        found = _fit(found, rim, _edge_offsets(region.astype(float), rim, found, reach, 0.1))
+    least = EDGE * float(np.median(slopes[plate]))
+    for reach in CLOSE:
+        found = _fit(found, edges, _edge_offsets(even, edges, found, reach, least))
+    if found.scale < MIN_SCALE:
+        raise RaptorError(
+            f"the mould is small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} are "
+            "needed; photograph it from nearer, cut the image out around it, or give --landmark"
+        )
+    _require_overlap(_overlap(found, mould, polygon), MIN_OVERLAP[1], mould)
+    offsets = _edge_offsets(even, rim, found, CLOSE[-1], least)
+    near = np.abs(offsets) < NEAR
+    residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
+    if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
+        raise RaptorError(
+            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, at least "
+            f"{100 * MIN_SEEN:.0f} % is needed, with a residual of {residual:.2f} l0, at most {MAX_RESIDUAL} "
+            f"is allowed; {ADVICE}"
+        )
+    _require_one_edge(even, rim, found, mould)
+    return Registration(found.matrix, "rim", residual)
+
+
+def mould_edges(mould: Mould) -> Edges:
+    """Points every 0.25 l0 along the outline and the tethers, away from corners."""
+    parts = [_edge_points(mould.outline), *(_edge_points(tether.polygon) for tether in mould.tethers)]
+    rim = np.repeat(np.arange(len(parts)) == 0, [len(points) for points, _ in parts])
+    points, normals = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Edges(points, normals, rim)
+
+
+def _edge_points(polygon: shapely.Polygon) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ring = polygon.exterior
+    along = np.arange(0.5 * SPACING, ring.length, SPACING)
+    at, before, after = (
+        shapely.get_coordinates(shapely.line_interpolate_point(ring, (along + step) % ring.length))
+        for step in (0.0, -CORNER, CORNER)
+    )
+    ahead, behind = after - at, at - before
+    tangent = ahead + behind
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    # A tether's curve turns too, but less than a corner does.
+    cosine = np.sum(ahead * behind, axis=1) / np.linalg.norm(ahead, axis=1) / np.linalg.norm(behind, axis=1)
+    straight = cosine > 0.8
+    normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    return at[straight], normal[straight]
+
+
+def _region(plate: NDArray[np.bool_], slopes: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """The largest thing (row, column) that is not plate, gaps and holes filled, out to the steepest slope."""
+    there = binary_opening(np.pad(~plate, GAP), iterations=2)
+    there = binary_fill_holes(binary_closing(there, iterations=GAP))[GAP:-GAP, GAP:-GAP]
+    pieces, _ = label(there)
+    sizes = np.bincount(pieces.ravel())
+    sizes[0] = 0
+    largest = pieces == sizes.argmax()
+    core = binary_erosion(largest, iterations=BLURRED) & (sizes.max() > 0)
+    if not core.any():
+        raise RaptorError(f"no mould is seen: the image shows one surface; {ADVICE}")
+    markers = np.where(core, 1, 0) + np.where(largest, 0, 2)
+    return np.asarray(watershed(slopes, markers) == 1)
+
+
+def _as_polygon(region: NDArray[np.bool_]) -> shapely.Polygon:
+    """The boundary of a region (row, column), as a polygon (column, row)."""
+    contour = max(find_contours(np.pad(region, 1).astype(float), 0.5), key=len) - 1
+    return shapely.Polygon(contour[:, ::-1]).buffer(0).simplify(0.5)
+
+
+def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registration:
+    """The mould's outline with the region's area and centre, in the direction of most overlap."""
+    scale = np.sqrt(region.area / mould.outline.area)
+    flip = np.diag([1.0, 1.0 if mirrored else -1.0])
+    centre, middle = (shapely.get_coordinates(shape.centroid)[0] for shape in (region, mould.outline))
+    best, found = 0.0, None
+    angles = np.arange(-ANGLES // 2, ANGLES // 2) * 2 * np.pi / ANGLES
+    for angle in sorted(angles, key=abs):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        matrix = np.eye(3)
+        matrix[:2, :2] = scale * turn @ flip
+        matrix[:2, 2] = centre - matrix[:2, :2] @ middle
+        candidate = Registration(matrix, "rim", float("nan"))
+        overlap = _overlap(candidate, mould, region)
+        if overlap > best + 1e-3:  # of a symmetric mould, the least turn
+            best, found = overlap, candidate
+    _require_overlap(best, MIN_OVERLAP[0], mould)
+    assert found is not None
+    return found
+
+
+def _overlap(registration: Registration, mould: Mould, region: shapely.Polygon) -> float:
+    """Intersection over union of the outline and the region found."""
+    shape = shapely.transform(mould.outline, registration.to_pixels)
+    common = shape.intersection(region).area
+    return float(common / (shape.area + region.area - common))
+
+
+def _require_overlap(overlap: float, least: float, mould: Mould) -> None:
+    if overlap < least:
+        raise RaptorError(
+            f"what is seen does not have the shape of {mould.name}: it overlaps with it by "
+            f"{100 * overlap:.0f} %, at least {100 * least:.0f} % is needed; {ADVICE}"
+        )
+
+
+def _slopes_across(
+    image: NDArray[np.float64], edges: Edges, registration: Registration, reach: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places along the normals (m,), l0, and the image's slope there (n, m), per pixel."""
+    step = 0.5 / registration.scale
+    count = int(np.ceil(reach / step)) + 1
+    along = np.arange(-count, count + 1, dtype=np.float64) * step
+    points = edges.points[:, None] + along[:, None] * edges.normals[:, None]
+    columns, rows = np.moveaxis(registration.to_pixels(points.reshape(-1, 2)).reshape(points.shape), -1, 0)
+    profile = map_coordinates(image, [rows, columns], order=1, mode="nearest")
+    return along, np.asarray(np.gradient(profile, 0.5, axis=1), dtype=np.float64)
+
+
+def _require_one_edge(
+    even: NDArray[np.float64], rim: Edges, registration: Registration, mould: Mould
+) -> None:
+    """Refuse a wall seen as a band: a second edge at one distance along much of the rim."""
+    along, slopes = _slopes_across(even, rim, registration, BAND)
+    # Of rising and of falling slopes, what a part of the rim is above.
+    common = np.abs(np.percentile(slopes, [100 * BAND_PART, 100 * (1 - BAND_PART)], axis=0)).max(axis=0)
+    apart = np.abs(along) > max(NEAR, BLURRED / 2 / registration.scale)
+    peaks, _ = find_peaks(common, height=SECOND_EDGE * common.max())
+    second = along[[peak for peak in peaks if apart[peak]]]
+    if len(second):
+        raise RaptorError(
+            f"the rim of {mould.name} shows a second edge, {abs(second[0]):.1f} l0 from the first: its wall "
+            "is seen as a band, or the tissue follows it closely; give --landmark at posts or corners"
+        )
+
+
+def _edge_offsets(
+    image: NDArray[np.float64], edges: Edges, registration: Registration, reach: float, least: float
+) -> NDArray[np.float64]:
+    """How far along its normal each edge point (n,) meets the steepest slope, l0; NaN without one."""
+    along, slope = _slopes_across(image, edges, registration, reach)
+    slope, step = np.abs(slope), along[1] - along[0]
+    top = 1 + slope[:, 1:-1].argmax(axis=1)
+    each = np.arange(len(top))
+    left, middle, right = (slope[each, top + k] for k in (-1, 0, 1))
+    curvature = left - 2 * middle + right
+    shift = np.where(curvature < 0, 0.5 * (left - right) / np.where(curvature < 0, curvature, 1.0), 0.0)
+    offsets = along[top] + np.clip(shift, -1, 1) * step
+    ends = (top == 1) | (top == slope.shape[1] - 2)  # still rising at the end: not this edge
+    return np.where((middle > least) & ~ends, offsets, np.nan)
+
+
+def _fit(registration: Registration, edges: Edges, offsets: NDArray[np.float64]) -> Registration:
+    """The similarity that brings the edge points to the edges found, robustly."""
+    there = np.isfinite(offsets)
+    if there.sum() < 8:
+        return registration
+    points, normals, wanted = edges.points[there], edges.normals[there], offsets[there]
+
+    def misses(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        a, b, dx, dy = change
+        moved = np.column_stack(
+            [a * points[:, 0] - b * points[:, 1] + dx, b * points[:, 0] + a * points[:, 1] + dy]
+        )
+        return np.asarray(np.sum(moved * normals, axis=1) - wanted)
+
+    a, b, dx, dy = least_squares(misses, np.zeros(4), loss="cauchy", f_scale=0.1).x
+    change = np.array([[1 + a, -b, dx], [b, 1 + a, dy], [0, 0, 1]])
+    return Registration(registration.matrix @ change, registration.method, registration.residual)

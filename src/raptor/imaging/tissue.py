@@ -1,0 +1,244 @@
+"""The tissue in a registered picture: its outline, its area and its width."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial, reduce
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+from skimage.filters import threshold_otsu
+from skimage.measure import find_contours
+
+from raptor.core.errors import RaptorError
+from raptor.fields.shape import outline_ratios
+from raptor.imaging.illumination import IGNORED, find_plate, fit_light, log_brightness
+from raptor.imaging.pictures import Picture
+from raptor.imaging.registration import Registration
+from raptor.moulds import Mould
+
+MARGIN = 0.25, 4.0  # l0, and pixels, by rim and tethers that are not read: shadow and blur reach so far
+SMOOTHING = 0.12  # l0, Gaussian, at least a pixel
+SPECK = 0.005  # of the depression's area: smaller pieces and holes are noise
+RIM_SHADOW = 0.5  # l0 outside the rim that is not taken for plate
+GRAIN = 0.01  # l0^2: smaller rings of a contour are not even looked at
+ROUNDS = 6  # of splitting the surfaces and fitting the light to them
+DEGREE = 4  # of the light's polynomial, where surfaces are known everywhere
+MIN_CONTRAST = 4.0  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
+RIM_BAND = 1.5  # l0 along the rim, where a tissue that contracts leaves the floor bare
+MAX_OUTSIDE = 0.05  # of a mask's tissue
+PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the two is tissue shows later
+
+
+class Tissue(StrEnum):
+    """How the tissue looks beside the floor of the depression."""
+
+    BRIGHT = "bright"
+    DARK = "dark"
+    AUTO = "auto"
+
+
+def tissue_named(name: str) -> Tissue:
+    """The look of a name; raises a RaptorError for another than bright, dark and auto."""
+    try:
+        return Tissue(name)
+    except ValueError:
+        raise RaptorError(f"tissue is {name}; allowed are bright, dark and auto") from None
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was measured.
+
+    Parameters
+    ----------
+    outline : shapely.Geometry
+        The tissue, a Polygon or MultiPolygon, l0.
+    area_ratio, width_ratio : float
+        A/A0 and w/w0; w/w0 is NaN where the central section meets no depression.
+    threshold : float
+        Brightness that parts tissue and floor: over that of the plate, uneven light taken out;
+        0.5 for a mask.
+    tissue : Tissue
+        Bright or dark.
+    contrast : float
+        Difference of tissue and floor, in standard deviations within them; NaN for a mask.
+    brightness : array (row, column)
+        What was compared with the threshold.
+    read : array (row, column)
+        The pixels of the depression that the threshold was chosen from.
+    registration : Registration
+    """
+
+    outline: shapely.Geometry
+    area_ratio: float
+    width_ratio: float
+    threshold: float
+    tissue: Tissue
+    contrast: float
+    brightness: NDArray[np.float64]
+    read: NDArray[np.bool_]
+    registration: Registration
+
+
+def measure(
+    picture: Picture,
+    mould: Mould,
+    registration: Registration,
+    tissue: Tissue = Tissue.AUTO,
+    threshold: float | None = None,
+) -> Measurement:
+    """Outline, area and width of the tissue in a picture registered to its mould.
+
+    A threshold that is not given is Otsu's (1979), among the depression's pixels.
+
+    Raises
+    ------
+    RaptorError
+        Where the depression lies outside the picture, no tissue is found, tissue and floor cannot be
+        told apart, the threshold is not among the brightnesses seen, or a mask leaves the depression.
+    """
+    size = picture.values.shape
+    margin = max(MARGIN[0], MARGIN[1] / registration.scale)
+    inside = registration.covers(mould.outline.buffer(-margin), size)
+    for tether in mould.tethers:
+        inside &= ~registration.covers(tether.polygon.buffer(margin), size)
+    _require_in_picture(mould, registration, size, inside)
+    if picture.mask:
+        tissue = Tissue.BRIGHT if tissue is Tissue.AUTO else tissue
+        if threshold is not None:
+            raise RaptorError("the image is a mask of two values; leave --threshold away")
+        brightness, level, contrast = picture.values, 0.5, float("nan")
+    else:
+        corrected = even_brightness(picture.values, mould, registration, inside)
+        sigma = max(1.0, SMOOTHING * registration.scale)
+        brightness = _smooth_within(corrected, inside, sigma)
+        level, contrast = _threshold(brightness[inside], threshold)
+        if tissue is Tissue.AUTO:
+            band = inside & ~registration.covers(mould.outline.buffer(-margin - RIM_BAND), size)
+            tissue = _look(brightness > level, inside, band)
+    outline = _outline(brightness, level, tissue, registration)
+    if picture.mask:
+        _require_inside(outline, mould)
+    # What a tether parts from the rest is no speck.
+    joined = shapely.union_all([outline.intersection(mould.outline), *(t.polygon for t in mould.tethers)])
+    joined = without_specks(joined, SPECK * mould.depression.area)
+    parts = shapely.get_parts(joined.intersection(mould.depression))
+    outline = shapely.union_all(parts[shapely.area(parts) > 0])  # where two tethers touch, a line is left
+    if outline.area < SPECK * mould.depression.area:
+        raise RaptorError(
+            f"no tissue is found at threshold {level:.3g} ({tissue.value} tissue); "
+            "look at --threshold and --tissue"
+        )
+    area, width = outline_ratios(outline, mould)
+    return Measurement(outline, area, width, level, tissue, contrast, brightness, inside, registration)
+
+
+def even_brightness(
+    values: NDArray[np.float64], mould: Mould, registration: Registration, inside: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Brightness (row, column) over that of the plate, with uneven light taken out.
+
+    `inside` (row, column) is what may be read of the depression; it is split in two surfaces, and
+    these and the plate are fitted together with the light, again and again.
+    """
+    log = log_brightness(values, max(1.0, SMOOTHING * registration.scale))
+    plate, flat, _ = find_plate(log)
+    plate &= ~registration.covers(mould.outline.buffer(RIM_SHADOW), log.shape)
+    labels = np.where(plate, PLATE, IGNORED).astype(np.int8)
+    for _ in range(ROUNDS):
+        split = threshold_otsu(flat[inside])
+        labels[inside] = np.where(flat[inside] > split, SECOND, FIRST)
+        light, levels = fit_light(log, labels, DEGREE)
+        flat = log - light - levels[PLATE]
+    return np.asarray(values * np.exp(-light - levels[PLATE]))
+
+
+def without_specks(shape: shapely.Geometry, least: float) -> shapely.Geometry:
+    """The shape without pieces and holes of less than an area, l0^2."""
+    pieces = [piece for piece in shapely.get_parts(shape) if piece.area >= least]
+    return shapely.union_all(
+        [
+            shapely.Polygon(piece.exterior, [r for r in piece.interiors if shapely.Polygon(r).area >= least])
+            for piece in pieces
+        ]
+    )
+
+
+def _smooth_within(
+    values: NDArray[np.float64], inside: NDArray[np.bool_], sigma: float
+) -> NDArray[np.float64]:
+    """Gaussian average over the pixels inside (normalised convolution: Knutsson and Westin 1993).
+
+    So what lies beyond rim and tethers does not count; there, the nearest average goes on.
+    """
+    blur = partial(gaussian_filter, sigma=sigma, mode="constant", truncate=4.0)
+    weight = blur(inside.astype(float))
+    known = weight > 1e-3
+    smooth = blur(np.where(inside, values, 0.0)) / np.where(known, weight, 1.0)
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(smooth[tuple(nearest)])
+
+
+def _threshold(seen: NDArray[np.float64], given: float | None) -> tuple[float, float]:
+    """The threshold, and the contrast of what lies on its two sides."""
+    level = float(threshold_otsu(seen)) if given is None else given
+    above = seen > level
+    if above.all() or not above.any():
+        raise RaptorError(
+            f"threshold is {level:.3g}; brightness in the depression goes from {seen.min():.3g} to "
+            f"{seen.max():.3g} of the plate's, so choose between"
+        )
+    within = np.sqrt(above.mean() * seen[above].var() + (~above).mean() * seen[~above].var())
+    contrast = float((seen[above].mean() - seen[~above].mean()) / within)
+    if given is None and contrast < MIN_CONTRAST:
+        raise RaptorError(
+            f"tissue and floor cannot be told apart: their contrast is {contrast:.1f} standard deviations, "
+            f"{MIN_CONTRAST} are needed; light them better, give a mask, or set --threshold"
+        )
+    return level, contrast
+
+
+def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.bool_]) -> Tissue:
+    """Bright or dark: the floor is what lies along the rim more than elsewhere."""
+    along, elsewhere = float(above[band].mean()), float(above[inside & ~band].mean())
+    if abs(along - elsewhere) < 0.1 * max(along, elsewhere):
+        raise RaptorError(
+            "it cannot be seen which surface is the tissue; give --tissue bright or --tissue dark"
+        )
+    return Tissue.DARK if along > elsewhere else Tissue.BRIGHT
+
+
+def _outline(
+    brightness: NDArray[np.float64], level: float, tissue: Tissue, registration: Registration
+) -> shapely.Geometry:
+    """What lies on the tissue's side of a level, as polygons in l0 between pixels."""
+    signed = (brightness - level) * (1 if tissue is Tissue.BRIGHT else -1)
+    signed = np.pad(signed, 1, constant_values=-float(np.abs(signed).max()))
+    rings = [registration.to_mould(ring[:, ::-1] - 1) for ring in find_contours(signed, 0.0) if len(ring) > 3]
+    shapes = [shape for ring in rings if (shape := shapely.Polygon(ring).buffer(0)).area > GRAIN]
+    # Contours do not cross, so a ring within a ring is a hole, and one within a hole a piece.
+    return reduce(shapely.symmetric_difference, shapes, shapely.Polygon())
+
+
+def _require_in_picture(
+    mould: Mould, registration: Registration, size: tuple[int, ...], inside: NDArray[np.bool_]
+) -> None:
+    corners = registration.to_pixels(shapely.get_coordinates(mould.outline))
+    rows, columns = size
+    reach = float(max((-corners).max(), (corners - (columns - 1, rows - 1)).max()))
+    if reach > 1 or np.count_nonzero(inside) < 100:
+        raise RaptorError(
+            f"{mould.name} does not lie in the image as registered, or covers too few pixels; "
+            "show all of it, larger, or look at the landmarks"
+        )
+
+
+def _require_inside(outline: shapely.Geometry, mould: Mould) -> None:
+    outside = outline.difference(mould.outline).area / max(outline.area, 1e-9)
+    if outside > MAX_OUTSIDE:
+        raise RaptorError(
+            f"{100 * outside:.0f} % of the mask lies outside the depression of {mould.name}, at most "
+            f"{100 * MAX_OUTSIDE:.0f} % may; look at the registration and at --tissue"
+        )

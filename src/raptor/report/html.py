@@ -1,0 +1,124 @@
+"""The report: one HTML file that can be read from the top, with every figure and number of a run inside.
+
+The text is a Jinja template; this module gives it the run's files and the ways to write numbers.
+"""
+
+import base64
+import json
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+import yaml
+
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.version import MODEL_VERSION, __version__
+from raptor.dataset.netcdf import REFERENCES
+
+READERS: dict[str, Callable[[Path], Any]] = {
+    ".csv": lambda path: pd.read_csv(path).to_dict("records"),
+    ".json": lambda path: json.loads(path.read_text()),
+    ".yaml": lambda path: yaml.safe_load(path.read_text()),
+    ".md": lambda path: path.read_text(),
+}
+"""How tables and texts of a run are read, by suffix."""
+NOTHING = "\N{EN DASH}"
+"""What stands in place of a number that there is not."""
+LARGE = 2**22  # bytes: no table that a page shows is larger
+
+
+def write_report(path: Path, template: Path, folder: Path, files: Iterable[Path]) -> None:
+    """Write the report of the run in `folder` from the template and those of its files that are given.
+
+    A part of the text whose files are not among them is left out.
+
+    Raises
+    ------
+    RaptorError
+        Where the template or a file cannot be read, or the template asks for what is not there.
+    """
+    given = [Path(file) for file in files]
+    figures = {file.stem: picture(file) for file in given if file.suffix == ".png"}
+    known = [file for file in given if file.suffix in READERS and file.is_relative_to(folder)]
+    tables = {
+        file.relative_to(folder).as_posix(): _read(file) for file in known if file.stat().st_size < LARGE
+    }
+    try:
+        text = render(template.read_text(encoding="utf-8"), {"figures": figures, "files": tables})
+    except OSError as error:
+        raise RaptorError(f"template {template} cannot be read: {error}") from error
+    except jinja2.TemplateError as error:
+        raise RaptorError(f"template {template}: {error}") from error
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def render(template: str, content: Mapping[str, Any]) -> str:
+    """A template filled in; what it names and `content` does not have is an error.
+
+    Filters: `number` and `percent` (both take digits), `section` of a Markdown text.
+    """
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"number": number, "percent": percent, "section": section}
+    versions = {"version": __version__, "model_version": MODEL_VERSION, "references": REFERENCES}
+    return environment.from_string(template).render(versions | dict(content))
+
+
+def picture(path: Path) -> str:
+    """A PNG as a data URI.
+
+    Raises
+    ------
+    RaptorError
+        Where it cannot be read.
+    """
+    try:
+        content = base64.b64encode(path.read_bytes()).decode("ascii")
+    except OSError as error:
+        raise RaptorError(f"figure {path} cannot be read: {error}") from error
+    return f"data:image/png;base64,{content}"
+
+
+def number(value: Any, digits: int = 2) -> str:
+    """A number with so many significant digits, thousands apart; a dash where there is none."""
+    if value is None or isinstance(value, str) or not math.isfinite(value):
+        return str(value) if isinstance(value, str) else NOTHING
+    if isinstance(value, int):
+        return f"{value:,}"
+    if value == 0:
+        return "0"
+    value = float(f"{value:.{digits - 1}e}")
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if places > digits + 3:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:,.{max(0, places)}f}"
+
+
+def percent(share: Any, digits: int = 0) -> str:
+    """A share in per cent; a dash where there is none."""
+    if share is None or not math.isfinite(share):
+        return NOTHING
+    return f"{100 * share:.{digits}f} %"
+
+
+def section(markdown: str, heading: str) -> str:
+    """The text under a heading of a Markdown text, without what follows the next; empty without any."""
+    found = re.search(rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", markdown, re.MULTILINE | re.DOTALL)
+    return " ".join(found[1].split()) if found else ""
+
+
+def _read(path: Path) -> Any:
+    """A table or text, by its suffix."""
+    try:
+        return READERS[path.suffix](path)
+    except pd.errors.EmptyDataError:
+        return []
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise RaptorError(f"{path} cannot be read: {error}") from error

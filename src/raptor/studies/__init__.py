@@ -1,0 +1,1 @@
+"""What simulations and surrogates are asked: evaluation, sweeps, speed against accuracy, active learning."""

@@ -1,0 +1,44 @@
+"""Where to spend further simulations: where the networks of an ensemble disagree most."""
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+import numpy as np
+import pandas as pd
+
+from raptor.condor.lattice import cast_sites
+from raptor.dataset.design import DesignRules, Run
+from raptor.dataset.further import further_set
+from raptor.moulds.geometry import Mould
+from raptor.moulds.random_moulds import RandomMoulds
+from raptor.moulds.raster import mould_image
+from raptor.surrogate.bands import relative_spread
+from raptor.surrogate.inference import Surrogate
+
+
+def enriched(
+    surrogate: Surrogate,
+    size: int,
+    candidates: int,
+    rules: DesignRules,
+    drawn: RandomMoulds,
+    seed: int,
+    on_progress: Callable[[int], None] = lambda number: None,
+) -> tuple[list[Run], list[Mould], pd.DataFrame]:
+    """Training runs, and their moulds: of candidates drawn like the design those of the largest disagreement.
+
+    Also returns the candidates as a table: parameters, disagreement about density, whether chosen.
+    """
+    runs, moulds = further_set("enriched", candidates, [], {}, rules, drawn, seed)
+    disagreements = []
+    for run, mould in zip(runs, moulds, strict=True):
+        image, cells = mould_image(mould, surrogate.pixels), len(cast_sites(mould, surrogate.layers))
+        fields, spread, _ = surrogate.ensemble(image, run.parameters, cells)
+        disagreements.append(relative_spread(spread, fields))
+        on_progress(run.simulation)
+    chosen = np.sort(np.argsort(disagreements)[::-1][:size])
+    table = pd.DataFrame([{"mould": run.mould} | asdict(run.parameters) for run in runs])
+    table["disagreement"] = disagreements
+    table["chosen"] = np.isin(np.arange(candidates), chosen)
+    kept = [replace(runs[number], simulation=place) for place, number in enumerate(chosen)]
+    return kept, [moulds[number] for number in chosen], table

@@ -1,0 +1,271 @@
+"""How good a surrogate is on held-out simulations, in itself and in multiples of the noise floor."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
+from raptor.fields.shape import area_ratio, density_threshold, width_ratio
+from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import MouldImage
+from raptor.surrogate.bands import LEVELS
+from raptor.surrogate.baselines import cast_density
+from raptor.surrogate.inference import Prediction, Surrogate
+from raptor.symmetry import FIELDS
+
+MEASURES = (*BULK, "area_ratio", "width_ratio")
+SHAPES = ("area_ratio", "width_ratio")
+ERRORS = ("vrmse", "masked_vrmse", "nrmse", "pearson")
+REGIONS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
+    "all": lambda table: table["delta"] > 0,
+    "delta below 0.3": lambda table: table["delta"] < 0.3,
+    "delta 0.3 to 0.6": lambda table: table["delta"].between(0.3, 0.6, inclusive="left"),
+    "delta 0.6 to 0.9": lambda table: table["delta"].between(0.6, 0.9, inclusive="left"),
+    "delta above 0.9": lambda table: table["delta"] >= 0.9,
+    "kappa_nnn below 0.3": lambda table: table["kappa_nnn"] < 0.3,
+    "kappa_nnnn below 0.1": lambda table: table["kappa_nnnn"] < 0.1,
+    "soft: delta above 0.8, kappa_nnn below 0.3": lambda table: (
+        (table["delta"] >= 0.8) & (table["kappa_nnn"] < 0.3)
+    ),
+}
+"""Regions of the parameters by which errors are told, each a mask of a table's rows."""
+
+Guess = NDArray[np.floating] | Prediction
+Predictor = Callable[[Sample, Mould], Guess]
+
+
+def sample_measures(
+    fields: NDArray[np.floating], sample: Sample, mould: Mould, layers: int
+) -> dict[str, float]:
+    """Bulk statistics, A/A0 and w/w0 of fields (8, y, x) on a sample's mould, keyed by `MEASURES`."""
+    threshold = density_threshold(layers, fields.shape[-1])
+    image = MouldImage(sample.depression.astype(bool), sample.tethers.astype(bool))
+    return bulk_statistics(fields, sample.n_cells, threshold) | {
+        "area_ratio": area_ratio(fields[0], image, threshold),
+        "width_ratio": width_ratio(fields[0], mould, threshold),
+    }
+
+
+def predictor_of(surrogate: Surrogate) -> Predictor:
+    """A surrogate's answer to a sample: with its bands, where it is calibrated."""
+
+    def answer(sample: Sample, mould: Mould) -> Guess:
+        if surrogate.calibration is not None:
+            return surrogate.examine(mould, sample.parameters)
+        return surrogate.predict_mould(mould, sample.parameters)
+
+    return answer
+
+
+def field_errors(
+    prediction: NDArray[np.floating], target: NDArray[np.floating], sample: Sample
+) -> dict[str, float]:
+    """Errors `ERRORS` of each field (8, y, x), whole and within the depression, and of density in tethers.
+
+    sxsz and sysz are compared by magnitude.
+    """
+    ours, theirs = without_sign(prediction), without_sign(target)
+    inside = sample.depression.astype(bool)
+    # A mask makes each field a single row of pixels.
+    masked = vrmse(ours[:, inside][:, None], theirs[:, inside][:, None])
+    errors: list[Sequence[float]] = [
+        list(vrmse(ours, theirs)), list(masked), list(nrmse(ours, theirs)), field_pearson(ours, theirs)
+    ]  # fmt: skip
+    row = {
+        f"{name}_{field}": float(value)
+        for name, values in zip(ERRORS, errors, strict=True)
+        for field, value in zip(FIELDS, values, strict=True)
+    }
+    return row | {"tether_error": _tether_error(ours, theirs, sample)}
+
+
+def _tether_error(ours: NDArray[np.floating], theirs: NDArray[np.floating], sample: Sample) -> float:
+    """Root mean square error of density (cells per pixel) over the pixels of tethers; NaN without any."""
+    there = sample.tethers.astype(bool)
+    if not there.any():
+        return float("nan")
+    return float(np.sqrt(((ours[0] - theirs[0])[there] ** 2).mean(dtype=np.float64)))
+
+
+def evaluate(
+    predict: Predictor,
+    stack: Path,
+    moulds: Mapping[str, Mould],
+    layers: int,
+    on_progress: Callable[[int], None] = lambda simulation: None,
+) -> pd.DataFrame:
+    """Errors and measures of every test sample of a stack, one row each.
+
+    Columns: what identifies the sample; `vrmse_`, `masked_vrmse_`, `nrmse_` and `pearson_` of each field;
+    `tether_error`; each of `MEASURES` as simulated and as predicted; where predictions have bands, the share
+    of pixels that each band holds (`cover95_density`), whether it holds A/A0 and w/w0, and the flag.
+    """
+    rows = []
+    for sample in read_samples(stack, read_table(stack).rows("test")):
+        mould = moulds[sample.mould]
+        guess = predict(sample, mould)
+        prediction = guess.fields if isinstance(guess, Prediction) else guess
+        row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
+        row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}
+        row |= field_errors(prediction, sample.fields, sample)
+        cast = cast_density(mould, layers, prediction.shape[-1])
+        row["vrmse_density_as_cast"] = float(vrmse(cast, sample.fields[0]))
+        for source, fields in (("simulated", sample.fields), ("predicted", prediction)):
+            measured = sample_measures(fields, sample, mould, layers)
+            row |= {f"{name}_{source}": value for name, value in measured.items()}
+        if isinstance(guess, Prediction):
+            row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.shape, strict=True)}
+            row |= _coverage(guess, sample, row)
+        rows.append(row)
+        on_progress(sample.simulation)
+    return pd.DataFrame(rows)
+
+
+def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What the bands hold, and the flag."""
+    inside = sample.depression.astype(bool)
+    held = guess.field_bands.hold(without_sign(guess.fields) - without_sign(sample.fields))
+    true = np.array([row[f"{name}_simulated"] for name in SHAPES])
+    shapes = guess.shape_bands.hold(guess.shape - true)
+    found: dict[str, Any] = {}
+    for number, level in enumerate(LEVELS):
+        name = f"cover{round(100 * level)}"
+        found |= {f"{name}_{f}": float(held[number, i][inside].mean()) for i, f in enumerate(FIELDS)}
+        for column, shape in enumerate(SHAPES):
+            known = np.isfinite(true[column])
+            found[f"{name}_{shape}"] = float(shapes[number, column]) if known else float("nan")
+    widest = guess.shape_bands.half[-1]
+    found |= {f"{name}_band95": float(widest[column]) for column, name in enumerate(SHAPES)}
+    return found | {"disagreement": guess.disagreement, "distance": guess.distance, "unlike": guess.unlike}
+
+
+def noise_floor(stack: Path, further: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:
+    """Seed-to-seed noise of each mould that was simulated again, one row each, under `evaluate`'s names.
+
+    Every pair of runs is compared as a prediction with its target would be; errors over sqrt 2 are those of
+    the best prediction possible, the mean of very many runs. Of measures the standard deviation.
+    """
+    table, again = read_table(stack), read_table(further)
+    rows = []
+    for mould in dict.fromkeys(again.mould):
+        first = [number for number, name in enumerate(table.mould) if name == mould]
+        others = [number for number, name in enumerate(again.mould) if name == mould]
+        samples = [*read_samples(stack, first), *read_samples(further, others)]
+        pairs = [field_errors(a.fields, b.fields, b) for a, b in combinations(samples, 2)]
+        row: dict[str, Any] = {"simulation": samples[0].simulation, "mould": mould, "runs": len(samples)}
+        row |= asdict(samples[0].parameters)
+        errors = pd.DataFrame(pairs).drop(columns=[f"pearson_{field}" for field in FIELDS]).mean()
+        row |= {str(name): float(value) / np.sqrt(2) for name, value in errors.items()}
+        measured = pd.DataFrame([sample_measures(s.fields, s, moulds[mould], layers) for s in samples])
+        row |= {name: float(measured[name].std(ddof=1)) for name in MEASURES}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def in_floors(metrics: pd.DataFrame, floor: pd.DataFrame) -> dict[str, float]:
+    """Mean errors of a model over the mean noise of the same moulds: 1 is the best there can be.
+
+    Fields by VRMSE; measures by root mean square error over root mean variance.
+    """
+    ours = metrics.set_index("simulation").loc[floor["simulation"]]
+    found = {field: float(ours[f"vrmse_{field}"].mean() / floor[f"vrmse_{field}"].mean()) for field in FIELDS}
+    found["tether_error"] = float(ours["tether_error"].mean() / floor["tether_error"].mean())
+    for name in MEASURES[1:]:  # mean P is the same in every simulation of a mould
+        error = (ours[f"{name}_predicted"] - ours[f"{name}_simulated"]).to_numpy()
+        noise = float(np.sqrt(np.nanmean(floor[name] ** 2)))
+        found[name] = float(np.sqrt(np.nanmean(error**2))) / noise if noise > 0 else float("nan")
+    return found
+
+
+def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[str, Any]:
+    """Means over a set: of fields, of bulk measures, of bands, and in multiples of the floor."""
+    fields = {
+        field: {name: float(metrics[f"{name}_{field}"].mean()) for name in ERRORS}
+        | {f"median_{name}": float(metrics[f"{name}_{field}"].median()) for name in ERRORS}
+        for field in FIELDS
+    }
+    covers = [column for column in metrics if str(column).startswith("cover")]
+    return {
+        "samples": len(metrics),
+        "not_converged": int((~metrics["converged"].astype(bool)).sum()),
+        "fields": fields,
+        "density_vrmse_as_cast": float(metrics["vrmse_density_as_cast"].mean()),
+        "tether_error": float(metrics["tether_error"].mean()),
+        "bulk": {name: agreement(metrics, name) for name in MEASURES},
+        "coverage": {column: float(metrics[column].mean()) for column in covers},
+        "unlike": float(metrics["unlike"].mean()) if "unlike" in metrics else None,
+        "in_floors": {} if floor is None or floor.empty else in_floors(metrics, floor),
+    }
+
+
+def by_region(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Errors in each of `REGIONS`, one row each; A/A0 and w/w0 by mean absolute error."""
+    rows = []
+    for name, belongs in REGIONS.items():
+        part = metrics[belongs(metrics)]
+        row: dict[str, Any] = {"region": name, "samples": len(part)}
+        if len(part):
+            row |= {
+                f"vrmse_{field}": part[f"vrmse_{field}"].mean() for field in ("density", "tension", "sxsx")
+            }
+            row |= {f"{shape}_mae": agreement(part, shape)["mae"] for shape in SHAPES}
+            row |= {f"{shape}_bias": agreement(part, shape)["bias"] for shape in SHAPES}
+            if "unlike" in part:
+                row["unlike"] = part["unlike"].mean()
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def regions_of(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Errors by region on the test split, then on each further set, of one model's tables by set."""
+    further = [
+        by_region(table).head(1).assign(region=f"further: {name}")
+        for name, table in tables.items()
+        if name != "test"
+    ]
+    return pd.concat([by_region(tables["test"]), *further], ignore_index=True)
+
+
+def worst(metrics: pd.DataFrame, count: int = 12) -> pd.DataFrame:
+    """The samples with the largest error of density, worst first."""
+    return metrics.sort_values("vrmse_density", ascending=False).head(count)
+
+
+def agreement(metrics: pd.DataFrame, name: str) -> dict[str, float]:
+    """Predicted against simulated; cases without the measure (no material there) are left out."""
+    pair = metrics[[f"{name}_simulated", f"{name}_predicted"]].dropna().to_numpy()
+    if len(pair) < 2:
+        nothing = dict.fromkeys(("pearson", "slope", "rmse", "mae", "bias"), float("nan"))
+        return {"samples": len(pair)} | nothing
+    simulated, predicted = pair.T
+    spread = float(((simulated - simulated.mean()) ** 2).sum())
+    covariance = float(((simulated - simulated.mean()) * (predicted - predicted.mean())).sum())
+    return {
+        "samples": len(pair),
+        "pearson": pearson(simulated, predicted),
+        "slope": covariance / spread if spread > 0 else float("nan"),
+        "rmse": float(np.sqrt(((predicted - simulated) ** 2).mean())),
+        "mae": float(np.abs(predicted - simulated).mean()),
+        "bias": float((predicted - simulated).mean()),
+    }
+
+
+def compare(summaries: Mapping[str, Mapping[str, Any]], costs: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """One row a model: its cost, and its errors in themselves and in multiples of the floor."""
+    rows = []
+    for cost in costs:
+        summary = summaries[cost["model"]]
+        floors, bulk = summary["in_floors"], summary["bulk"]
+        row = dict(cost) | {f"vrmse_{f}": summary["fields"][f]["vrmse"] for f in FIELDS}
+        row |= {f"pearson_{name}": bulk[name]["pearson"] for name in MEASURES}
+        row |= {f"{shape}_mae": bulk[shape]["mae"] for shape in SHAPES}
+        row |= {f"{name}_in_floors": floors.get(name, np.nan) for name in (*FIELDS, "tether_error", *SHAPES)}
+        rows.append(row)
+    return pd.DataFrame(rows)

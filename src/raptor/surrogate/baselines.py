@@ -1,0 +1,112 @@
+"""Predictions without a network, which every network has to beat."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raptor.condor.lattice import cast_sites
+from raptor.core.errors import RaptorError
+from raptor.dataset.examples import Example, transform_sample
+from raptor.dataset.scaling import scale_inputs
+from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.raster import rasterise
+from raptor.moulds.geometry import Mould
+from raptor.symmetry import Element
+
+COARSE = 16  # pixels of the images by which moulds are compared
+BASELINES = ("nearest", "mean")
+
+
+def training_mean(stack: Path, examples: list[Example]) -> NDArray[np.float64]:
+    """Mean fields (8, y, x) of the augmented training examples: what a guess without inputs gives."""
+    total, chosen = np.zeros(()), training_examples(stack, examples)
+    for sample, element in _images(stack, chosen):
+        total = total + transform_sample(sample, element).fields
+    return np.asarray(total / len(chosen), dtype=np.float64)
+
+
+def cast_density(mould: Mould, layers: int, pixels: int) -> NDArray[np.float64]:
+    """Density (y, x) before any contraction: what a guess of "nothing happens" gives."""
+    sites = cast_sites(mould, layers)
+    return np.asarray(rasterise(sites, np.ones_like(sites), np.zeros(len(sites)), pixels)[0])
+
+
+def training_examples(stack: Path, examples: list[Example]) -> list[Example]:
+    """Those of the training split, by row of the stack."""
+    splits = read_table(stack).split
+    return sorted(
+        (example for example in examples if splits[example.sample] == "train"),
+        key=lambda example: (example.sample, example.element),
+    )
+
+
+@dataclass
+class Nearest:
+    """Fields of the training example whose mould and parameters are nearest to what is asked for.
+
+    The distance is Euclidean: of masks as images of `COARSE` pixels, over their mean distance in the
+    training set, and of scaled parameters over theirs.
+    """
+
+    stack: Path
+    examples: list[Example]
+    _keys: NDArray[np.float32] = field(init=False)
+    _weights: NDArray[np.float32] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.examples = training_examples(self.stack, self.examples)
+        keys = [
+            _key(transform_sample(sample, element)) for sample, element in _images(self.stack, self.examples)
+        ]
+        self._keys = np.stack(keys)
+        variance = self._keys.var(axis=0)
+        images, parameters = variance[:-3].sum(), variance[-3:].sum()
+        sizes = np.r_[np.full(len(variance) - 3, images), np.full(3, parameters)]
+        self._weights = (1 / (sizes + 1e-12)).astype(np.float32)
+
+    def fields(self, sample: Sample) -> NDArray[np.float32]:
+        """Fields (8, y, x) of the nearest example."""
+        distance = (((self._keys - _key(sample)) ** 2) * self._weights).sum(axis=1)
+        example = self.examples[int(distance.argmin())]
+        (found,) = read_samples(self.stack, [example.sample])
+        return transform_sample(found, Element.from_index(example.element)).fields
+
+
+def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sample, Mould], NDArray[Any]]:
+    """One of `BASELINES`, as a function from a sample's inputs to fields (8, y, x).
+
+    Raises
+    ------
+    RaptorError
+        Where there is no such baseline.
+    """
+    if name == "nearest":
+        nearest = Nearest(stack, examples)
+        return lambda sample, mould: nearest.fields(sample)
+    if name == "mean":
+        mean = training_mean(stack, examples)
+        return lambda sample, mould: mean
+    raise RaptorError(f"there is no baseline '{name}'; known are {', '.join(BASELINES)}")
+
+
+def _images(stack: Path, examples: list[Example]) -> Iterator[tuple[Sample, Element]]:
+    """Samples and elements of examples in order of rows, each sample read once."""
+    rows = list(dict.fromkeys(example.sample for example in examples))
+    elements: dict[int, list[Element]] = {row: [] for row in rows}
+    for example in examples:
+        elements[example.sample].append(Element.from_index(example.element))
+    for row, sample in zip(rows, read_samples(stack, rows), strict=True):
+        for element in elements[row]:
+            yield sample, element
+
+
+def _key(sample: Sample) -> NDArray[np.float32]:
+    """What examples are compared by: coarse masks, then scaled parameters, flat."""
+    inputs = scale_inputs(sample.depression, sample.tethers, sample.parameters)
+    step = inputs.shape[-1] // COARSE
+    squares = inputs[:2].reshape(2, COARSE, step, COARSE, step).mean(axis=(2, 4))
+    return np.concatenate([squares.ravel(), inputs[2:, 0, 0]]).astype(np.float32)

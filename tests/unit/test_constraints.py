@@ -1,0 +1,122 @@
+"""Whatever a network says, its predictions obey what every tissue obeys."""
+
+import numpy as np
+import pytest
+import shapely
+import torch
+
+from raptor.dataset.scaling import Scaling
+from raptor.fields.raster import rasterise
+from raptor.fields.resample import pooled, refined
+from raptor.moulds import Circle, Mould, mould_image
+from raptor.parameters import CellParameters
+from raptor.surrogate import constraints
+from raptor.surrogate.batches import apply
+from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.networks import Architecture, Generator, initialise
+from raptor.symmetry import Element
+
+PIXELS, CELLS = 64, 300
+SCALING = Scaling((0.2, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0), (0.2, 1.5, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1))
+MOULD = Mould(shapely.box(-9, -5, 7, 5), (Circle(4.0, 1.0, 1.2),), name="lopsided")
+PARAMETERS = CellParameters(0.6, 0.4, 0.2)
+
+
+def depression():
+    return torch.from_numpy(mould_image(MOULD, PIXELS).depression.astype(np.float32))[None, None]
+
+
+def require_physical(fields, cells=CELLS, small=1e-5):
+    """Fields (n, 8, y, x) in physical units of `MOULD`."""
+    fields = fields.double()
+    density, xx, yy, zz = fields[:, 0], fields[:, 2], fields[:, 3], fields[:, 4]
+    top = float(density.max())
+    assert density.min() >= 0
+    assert density.sum((1, 2)).numpy() == pytest.approx(cells, rel=1e-5)
+    assert (xx + yy + zz - density).abs().max() < small * top
+    rows = torch.stack([xx, fields[:, 5], fields[:, 6], fields[:, 5], yy, fields[:, 7]], -1)
+    tensor = torch.cat([rows, torch.stack([fields[:, 6], fields[:, 7], zz], -1)], -1)
+    lowest = torch.linalg.eigvalsh(tensor.reshape(*xx.shape, 3, 3))[..., 0]
+    assert lowest.min() > -small * top
+    outside = constraints.reachable(depression())[0, 0] == 0
+    assert outside.any()
+    assert (density[:, outside] == 0).all()
+
+
+def random_fields(count=3, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    return torch.randn(count, 8, PIXELS, PIXELS, generator=generator)
+
+
+def test_reach_is_five_sigma_and_covers_thin_posts():
+    there = constraints.reachable(depression())[0, 0]
+    x = (torch.arange(PIXELS) + 0.5) * 62.5 / PIXELS - 31.25
+    row = there[PIXELS // 2]
+    assert float(x[row > 0].min()) == pytest.approx(-9 - constraints.DEEP, abs=62.5 / PIXELS)
+    assert (there >= depression()[0, 0]).all()
+
+
+def test_outputs_obey_the_physics_by_construction():
+    head = constraints.PhysicalFields(SCALING)
+    cells = torch.full((3,), float(CELLS))
+    for size in (1.0, 30.0):
+        scaled = head(size * random_fields(), depression().expand(3, -1, -1, -1), cells)
+        require_physical(torch.from_numpy(SCALING.inverse(scaled.numpy())), small=1e-4)
+
+
+def test_any_fields_obey_it_after_projection_and_physical_ones_stay():
+    masks, cells = depression().expand(3, -1, -1, -1), torch.full((3,), float(CELLS))
+    once = constraints.project(random_fields(), masks, cells)
+    require_physical(once)
+    twice = constraints.project(once, masks, cells)
+    assert (twice - once).abs().max() < 1e-4 * once.abs().max()
+
+
+def test_an_average_obeys_it_and_keeps_what_does_not_change():
+    masks, cells = depression().expand(3, -1, -1, -1), torch.full((3,), float(CELLS))
+    fields = constraints.project(random_fields(), masks, cells)
+    require_physical(constraints.signed(constraints.average(fields)[None]))
+    alike = constraints.signed(constraints.average(fields[:1].expand(4, -1, -1, -1))[None])[0]
+    assert (constraints.unsigned(alike) - constraints.unsigned(fields[0])).abs().max() < 1e-3 * fields[
+        0
+    ].abs().max()
+    flipped = fields[:1] * torch.tensor([1.0, 1, 1, 1, 1, 1, -1, -1])[:, None, None]
+    both = constraints.signed(constraints.average(torch.cat([fields[:1], flipped]))[None])[0]
+    assert (both - alike).abs().max() < 1e-5 * fields[0].abs().max()
+
+
+@pytest.mark.parametrize("seen", [PIXELS, PIXELS // 2])
+@pytest.mark.parametrize("network", ["pix2pix", "compact", "fno"])
+def test_the_prediction_of_a_turned_mould_is_the_turned_prediction(network, seen):
+    torch.manual_seed(0)
+    architecture = Architecture(seen, 8, network=network)
+    generator, twin = Generator(architecture, SCALING), Generator(architecture, SCALING)
+    if network == "pix2pix":
+        initialise(generator)
+        initialise(twin)
+    surrogate = Surrogate((generator.eval(), twin.eval()), architecture, SCALING, 2, PIXELS)
+    image = mould_image(MOULD, PIXELS)
+    plain = surrogate.predict(image.depression, image.tethers, [PARAMETERS], CELLS)[0]
+    require_physical(torch.from_numpy(plain)[None], small=1e-4)
+    for element in (Element(1, mirror=False), Element(2, mirror=True)):
+        turned = MOULD.transformed(element.matrix)
+        masks = mould_image(turned, PIXELS)
+        found = surrogate.predict(masks.depression, masks.tethers, [PARAMETERS], CELLS)[0]
+        wanted = constraints.unsigned(apply(torch.from_numpy(plain), element))
+        assert (
+            constraints.unsigned(torch.from_numpy(found)) - wanted
+        ).abs().max() < 1e-5 * wanted.abs().max()
+
+
+def test_a_coarse_image_of_a_tissue_holds_the_fine_one():
+    rng = np.random.default_rng(0)
+    positions = rng.uniform((-12, -8, 0), (10, 9, 3), (400, 3))
+    orientation = rng.normal(size=(400, 3))
+    orientation /= np.linalg.norm(orientation, axis=1)[:, None]
+    cells = (positions, orientation, rng.normal(size=400))
+    fine, coarse = (torch.from_numpy(rasterise(*cells, pixels)) for pixels in (256, 128))
+    assert (4 * pooled(fine, 128) - coarse).abs().max() < 1e-7 * coarse.abs().max()  # sums over squares
+    for pixels, least in ((128, 1e-5), (64, 0.05)):
+        again = refined(pooled(fine, pixels), 256)
+        assert (again - fine).abs().max() < least * fine.abs().max()
+    assert refined(fine, 256) is fine

@@ -1,0 +1,263 @@
+"""Bands hold their share, flags fire, and the noise floor is what it says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+import torch
+from scipy.ndimage import gaussian_filter
+
+from raptor.core.errors import RaptorError
+from raptor.dataset.design import Run, read_design, write_design
+from raptor.dataset.examples import augment, training_scaling, transform_sample, with_further
+from raptor.dataset.further import CORNER, further_set
+from raptor.dataset.loader import ExampleSet
+from raptor.dataset.run import simulate_shard
+from raptor.dataset.shards import write_shard
+from raptor.dataset.stack import build_stack, read_samples, read_table
+from raptor.fields.shape import density_threshold, ratios_above
+from raptor.frame import pixel_centres
+from raptor.moulds import Mould, moulds_by_id
+from raptor.moulds.raster import mould_image
+from raptor.studies.active_learning import enriched
+from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
+from raptor.surrogate.bands import LEVELS, Bands, fit_scale
+from raptor.surrogate.baselines import Nearest, baseline, training_mean
+from raptor.surrogate.calibration import Silhouette, calibrate, fit_edge
+from raptor.surrogate.costs import costs_of
+from raptor.surrogate.files import load, save, write_prediction
+from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.networks import Architecture, Generator
+from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty, descriptors
+from raptor.symmetry import FIELDS, Element
+from tests.small import CONFIG, MODEL
+
+
+@pytest.fixture
+def stack(made):
+    return made / "dataset" / "fields.nc"
+
+
+@pytest.fixture
+def moulds(made):
+    return moulds_by_id(made / "design" / "moulds.geojson")
+
+
+@pytest.fixture
+def surrogate(stack, moulds):
+    """Two untrained networks, calibrated."""
+    torch.manual_seed(0)
+    architecture, scaling = Architecture(32, 4, network="compact"), training_scaling(stack)
+    members = tuple(Generator(architecture, scaling).eval() for _ in range(2))
+    plain = Surrogate(members, architecture, scaling, MODEL.layers, 32)
+    return replace(plain, calibration=calibrate(plain, stack, moulds, 0))
+
+
+def test_bands_hold_their_share_of_errors_like_those_they_were_fitted_to():
+    rng = np.random.default_rng(0)
+    spread, size = rng.gamma(2.0, 1.0, (2, 40_000, 3))
+    error = rng.standard_t(3, (40_000, 3)) * np.hypot(spread, 0.3 * size) * np.array([0.1, 1, 10])
+    half = 20_000
+    scale = fit_scale(error[:half], spread[:half], size[:half])
+    bands = scale.bands(spread[half:].T, size[half:].T)
+    held = bands.hold(error[half:].T)
+    assert held.mean(axis=2) == pytest.approx(np.tile(LEVELS, (3, 1)).T, abs=0.01)
+    assert (np.diff(bands.half, axis=0) > 0).all()
+
+
+def test_a_band_of_few_errors_is_wider_than_their_quantile():
+    error = np.arange(1.0, 20.0)[:, None]
+    scale = fit_scale(error, np.zeros_like(error), np.ones_like(error))
+    half = scale.bands(np.zeros(1), np.ones(1)).half[:, 0]
+    assert half[0] == pytest.approx(10)
+    assert half[2] == pytest.approx(19)
+    assert Bands(half[:, None]).hold(np.array([18.0])).ravel().tolist() == [False, False, True]
+
+
+def test_descriptors_do_not_change_with_the_view_and_tell_a_bar_from_posts(stack):
+    (sample,) = read_samples(stack, [0])
+    plain = descriptors(sample.depression, sample.tethers, sample.parameters)
+    assert len(plain) == len(DESCRIPTORS)
+    for element in Element.all():
+        moved = transform_sample(sample, element)
+        assert descriptors(moved.depression, moved.tethers, moved.parameters) == pytest.approx(plain)
+    tethers = np.zeros_like(sample.tethers)
+    tethers[4:28, 15] = 1
+    barred = descriptors(sample.depression, tethers, sample.parameters)
+    named = dict(zip(DESCRIPTORS, barred, strict=True))
+    assert named["tethers"] == 1
+    assert named["longest_tether"] > 24 * 62.5 / 32
+
+
+def test_what_is_far_from_all_points_is_novel():
+    points = np.random.default_rng(0).normal(size=(500, 9)).astype(np.float32)
+    novelty = Novelty(points, 2.0)
+    assert novelty.distance(points[3].astype(np.float64)) == pytest.approx(0, abs=1e-6)
+    assert novelty.distance(np.full(9, 6.0)) > 3
+
+
+def test_the_edge_of_softer_images_is_found():
+    """Blurred tissues that fill less and less of a mould, at a threshold below half of their density."""
+    mould = Mould(shapely.box(-20, -10, 20, 10))
+    image = mould_image(mould, 128)
+    x, y = np.meshgrid(pixel_centres(128), pixel_centres(128))
+    silhouettes = []
+    for part in (0.5, 0.6, 0.7, 0.8):
+        sharp = 1 / (1 + np.exp(4 * np.maximum(np.abs(x) - 20 * part, np.abs(y) - 10 * part)))
+        soft = gaussian_filter(sharp, 3.0)
+        true = ratios_above(sharp, image, mould, 0.3)
+        silhouettes.append(Silhouette(image, mould, true, soft, soft[None]))
+    edge = fit_edge(silhouettes, 0.3)
+    assert edge > 1.02
+    before, after = (np.mean([np.abs(s.error(e * 0.3)) for s in silhouettes]) for e in (1.0, edge))
+    assert after < 0.5 * before
+    assert silhouettes[0].errors(0.3).shape == (3, 2)
+    same = [replace(s, true=ratios_above(s.predicted, image, mould, 0.3)) for s in silhouettes]
+    assert fit_edge(same, 0.3) == pytest.approx(1, abs=5e-3)
+
+
+def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogate, moulds, stack, tmp_path):
+    (sample,) = read_samples(stack, read_table(stack).rows("test")[:1])
+    mould = moulds[sample.mould]
+    prediction = surrogate.examine(mould, sample.parameters)
+    assert prediction.fields.shape == (8, 32, 32)
+    assert prediction.field_bands.half.shape == (3, 8, 32, 32)
+    assert prediction.shape_bands.half.shape == (3, 2)
+    assert np.allclose(prediction.fields, surrogate.predict_mould(mould, sample.parameters), atol=1e-5)
+    for half in (False, True):
+        folder = tmp_path / f"{half}"
+        states = [member.state_dict() for member in surrogate.members]
+        content = ({"training": {"threads": 1}}, "id", surrogate.calibration)
+        save(folder, states, surrogate.architecture, surrogate.scaling, 2, 32, *content, half=half)
+        again = load(folder).examine(mould, sample.parameters)
+        near = 5e-3 if half else 1e-6
+        assert np.abs(again.fields - prediction.fields).max() < near * np.abs(prediction.fields).max()
+        assert again.shape_bands.half == pytest.approx(prediction.shape_bands.half, rel=0.05)
+        assert again.distance == pytest.approx(prediction.distance)
+        assert again.threshold == pytest.approx(prediction.threshold)
+    assert prediction.threshold != pytest.approx(density_threshold(2, 32), rel=1e-3)
+    write_prediction(tmp_path / "p.nc", prediction, mould, sample.parameters)
+    with pytest.raises(RaptorError, match="not calibrated"):
+        replace(surrogate, calibration=None).examine(mould, sample.parameters)
+
+
+def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
+    metrics = evaluate(predictor_of(surrogate), stack, moulds, 2)
+    assert len(metrics) == 2
+    truth = evaluate(lambda sample, mould: sample.fields, stack, moulds, 2)
+    assert (truth[[f"vrmse_{field}" for field in FIELDS]] == 0).all(axis=None)
+    assert (truth["tether_error"].dropna() == 0).all()
+    assert (truth["area_ratio_predicted"] == truth["area_ratio_simulated"]).all()
+    summary = summarise(metrics)
+    assert summary["fields"]["density"]["vrmse"] == pytest.approx(metrics["vrmse_density"].mean())
+    assert set(summary["coverage"]) == {
+        f"cover{level}_{name}" for level in (50, 80, 95) for name in (*FIELDS, "area_ratio", "width_ratio")
+    }
+    regions = by_region(metrics).set_index("region")
+    assert regions.loc["all", "samples"] == 2
+    below = int((metrics["delta"] < 0.3).sum())
+    assert regions.loc["delta below 0.3", "samples"] == below
+    costs = costs_of(
+        surrogate, {"training": {"threads": 2}}, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]})
+    )
+    assert costs["training_core_minutes"] == pytest.approx(2.0)
+    assert costs["all_ms"] > 0
+
+
+def test_the_noise_floor_is_the_error_of_the_mean_of_many_runs(made, stack, moulds, tmp_path):
+    runs = read_design(made / "design" / "design.csv")
+    again, their_moulds = further_set(
+        "floor", 4, runs, moulds, CONFIG.design_rules(), CONFIG.random_moulds(), 5, seeds=2
+    )
+    by_mould = {run.mould: run for run in runs}
+    assert len(their_moulds) == 2
+    assert all(by_mould[run.mould].split == "test" for run in again)
+    assert all(by_mould[run.mould].parameters == run.parameters for run in again)
+    assert len({run.seed for run in again} | {run.seed for run in runs}) == len(again) + len(runs)
+    simulations, failures = simulate_shard(again, moulds, MODEL, "draft")
+    write_shard(tmp_path / "f.nc", again, simulations, MODEL, "draft", "c", failures)
+    further = tmp_path / "fields.nc"
+    build_stack(
+        further, [tmp_path / "f.nc"], again, moulds, 32, simulation_configuration="c", configuration="d"
+    )
+    floor = noise_floor(stack, further, moulds, 2)
+    assert floor["runs"].tolist() == [3, 3]
+    # Another run scores sqrt 2 floors, in the mean over all pairs of runs.
+    samples = list(read_samples(further, read_table(further).rows("test")))
+    of_mould = {mould: [s.fields for s in samples if s.mould == mould] for mould in floor["mould"]}
+    other = evaluate(lambda sample, mould: of_mould[sample.mould][0], stack, moulds, 2)
+    assert 0.7 < in_floors(other, floor)["density"] / np.sqrt(2) < 1.4
+    perfect = evaluate(lambda sample, mould: sample.fields, stack, moulds, 2)
+    assert in_floors(perfect, floor)["density"] == 0
+
+
+@pytest.mark.parametrize("name", ["bars", "slender", "corner"])
+def test_further_sets_are_held_out_castable_and_unlike(name, tmp_path):
+    paper = CONFIG.model_copy(update={"moulds": CONFIG.moulds.model_copy(update={"cells": (400, 900)})})
+    drawn = paper.random_moulds()
+    runs, moulds = further_set(name, 5, [], {}, CONFIG.design_rules(), drawn, 3)
+    again, _ = further_set(name, 5, [], {}, CONFIG.design_rules(), drawn, 3)
+    assert runs == again
+    write_design(tmp_path / "design.csv", runs)
+    assert all(isinstance(run, Run) and run.split == "test" for run in runs)
+    simulations, failures = simulate_shard(runs[:1], {m.name: m for m in moulds}, MODEL, "draft")
+    assert not failures
+    assert len(simulations) == 1
+    if name == "corner":
+        for run in runs:
+            assert run.parameters.delta >= CORNER.delta.lower
+            assert run.parameters.kappa_nnn <= CORNER.kappa_nnn.upper
+    else:
+        assert all(mould.tethers for mould in moulds)
+    with pytest.raises(RaptorError, match="no further set 'bar'"):
+        further_set("bar", 5, [], {}, CONFIG.design_rules(), drawn, 3)
+
+
+def test_baselines(stack):
+    examples = augment(stack)
+    table = read_table(stack)
+    nearest = Nearest(stack, examples)
+    for sample in read_samples(stack, table.rows("train")):
+        assert np.array_equal(nearest.fields(sample), sample.fields)
+        turned = transform_sample(sample, Element(1, mirror=True))
+        same = np.abs(nearest.fields(turned) - turned.fields).max()
+        assert same <= 1e-6 or not np.array_equal(turned.depression, sample.depression)
+    mean = training_mean(stack, examples)
+    chosen = [e for e in examples if table.split[e.sample] == "train"]
+    plain = np.mean(
+        [
+            transform_sample(
+                next(iter(read_samples(stack, [e.sample]))), Element.from_index(e.element)
+            ).fields
+            for e in chosen
+        ],
+        axis=0,
+    )
+    assert mean == pytest.approx(plain, abs=1e-5)
+    with pytest.raises(RaptorError, match="no baseline 'median'"):
+        baseline("median", stack, examples)
+
+
+def test_enrichment_chooses_where_networks_disagree(surrogate):
+    rules, drawn = CONFIG.design_rules(), CONFIG.random_moulds()
+    runs, moulds, table = enriched(surrogate, 3, 9, rules, drawn, 1)
+    assert [run.simulation for run in runs] == [0, 1, 2]
+    assert [mould.name for mould in moulds] == [run.mould for run in runs]
+    assert all(run.split == "train" for run in runs)
+    chosen = table[table["chosen"]]
+    assert chosen["mould"].tolist() == [run.mould for run in runs]
+    assert chosen["disagreement"].min() >= table.loc[~table["chosen"], "disagreement"].max()
+
+
+def test_examples_of_two_stacks_are_counted_through(stack):
+    one, scaling = augment(stack), training_scaling(stack)
+    table = read_table(stack)
+    both, splits = with_further(stack, one, [stack])
+    assert splits == 2 * table.split
+    learnt = [example for example in one if table.split[example.sample] == "train"]
+    assert len(both) == len(one) + len(learnt)
+    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, [*one, *learnt], scaling)
+    for number in range(len(both)):
+        assert all(torch.equal(a, b) for a, b in zip(joined[number], alone[number], strict=True))

@@ -18,8 +18,7 @@ from benchmarks.solvers import (
 )
 from raptor.condor import simulate
 from raptor.condor.system import build_system
-from raptor.moulds import Mould
-from raptor.moulds.library import STANDARD
+from raptor.moulds import Mould, read_mould
 from raptor.parameters import CellParameters, NetworkModel
 
 MIDDLE = CellParameters(0.5, 0.5, 0.3)
@@ -32,9 +31,9 @@ def main(
     quick: Annotated[bool, typer.Option(help="a small mould, to see that everything runs")] = False,
 ) -> None:
     """Kernels and solvers against baselines in the same run, on one core."""
-    mould, model = STANDARD["reference_rectangle"](), NetworkModel(6)
+    mould, model = read_mould("reference_rectangle"), NetworkModel(6)
     if quick:
-        mould, model = STANDARD["small_rectangle"](), NetworkModel(2)
+        mould, model = read_mould("small_rectangle"), NetworkModel(2)
     system = build_system(mould, MIDDLE, model)
     CONSOLE.print(
         f"{mould.name}: {system.lattice.cells} cells, {system.lattice.bonds} bonds, {model.layers} layers"

@@ -19,8 +19,6 @@ from raptor.fields.shape import outline_ratios
 from raptor.imaging import Registration, as_picture, measure, register
 from raptor.moulds import read_mould
 
-MOULDS = Path(__file__).parents[1] / "config" / "moulds"
-
 
 @dataclass(frozen=True)
 class Camera:
@@ -127,7 +125,7 @@ class Case:
     def made(self):
         """The mould, the tissue and its photograph."""
         seed = CASES.index(self)
-        mould = read_mould(MOULDS / f"{self.mould}.geojson")
+        mould = read_mould(self.mould)
         tissue = contracted(mould, self.waist, self.shrink, self.waves, seed)
         return mould, tissue, photograph(mould, tissue, self.camera, seed)
 

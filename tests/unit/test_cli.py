@@ -17,10 +17,10 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.dataset.check import check
 from raptor.moulds import Mould, read_mould, write_moulds
+from raptor.moulds.library import MOULDS
 
 ROOT = Path(__file__).parents[2]
-MOULD = str(ROOT / "config" / "moulds" / "tenocyte.geojson")
-TISSUES = str(ROOT / "config" / "tissues.yaml")
+MOULD = str(MOULDS["tenocyte"])
 DOG_BONE = ROOT / "tests" / "data" / "moulds"
 
 
@@ -48,7 +48,6 @@ def test_simulate_takes_a_tissue_and_gives_a_picture_and_numbers(tmp_path):
     done = raptor(
         "simulate", DOG_BONE / "dog_bone.svg", "--tissue", "corneal", "--delta", 0.3, "--scale", 0.5,
         "--layers", 1, "--accuracy", "draft", "--output", output, "--picture", picture, "--json",
-        "--tissues", ROOT / "config" / "tissues.yaml",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     numbers = json.loads(done.stdout)
@@ -106,10 +105,10 @@ def test_every_command_teaches_by_an_example():
     ("arguments", "message"),
     [
         ((MOULD,), "give --delta, --kappa-nnn, --kappa-nnnn, or --tissue NAME"),
-        ((MOULD, "--tissue", "glia_1", "--tissues", TISSUES), "did you mean 'glial_1'?"),
+        ((MOULD, "--tissue", "glia_1"), "did you mean 'glial_1'?"),
         (
             (MOULD, "--tissue", "glial_1", "--tissues", "none.yaml"),
-            "none.yaml, in which tissues are described",
+            "none.yaml cannot be read",
         ),
         ((MOULD, *options(), "--picture", "a.gif"), "a.gif is no picture's name"),
         (("none.geojson", *options()), "none.geojson does not exist"),
@@ -222,7 +221,7 @@ def untrained(folder):
 def test_fit_by_a_surrogate_gives_intervals(tmp_path):
     output, picture = tmp_path / "fit.json", tmp_path / "fit.png"
     done = raptor(
-        "fit", MOULD, "--tissue", "glial_1", "--tissues", TISSUES, "--model", untrained(tmp_path),
+        "fit", MOULD, "--tissue", "glial_1", "--model", untrained(tmp_path),
         "--output", output, "--picture", picture, "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -268,7 +267,7 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
     [
         ((), "give what was measured in one way"),
         (("--tissue", "glial_1", "--area-ratio", 0.5), "give what was measured in one way"),
-        (("--tissue", "tenocyte", "--tissues", TISSUES), "has no measured ratio to fit"),
+        (("--tissue", "tenocyte"), "has no measured ratio to fit"),
         (("--area-ratio", 2), "a ratio to the mould's lies between 0 and 1.5"),
         (("--area-ratio", 0.5, *options()), "give --by simulator too"),
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),

@@ -5,9 +5,10 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from raptor.config import Configuration, Tissue, load, load_tissues, require_measured
+from raptor.config import Configuration, load, require_measurable
 from raptor.config.reference import key_table, write_reference
 from raptor.core.errors import RaptorError
+from raptor.moulds.library.tissues import Tissue, load_tissues, require_measured
 
 
 @pytest.fixture
@@ -107,9 +108,10 @@ def test_a_model_continues_one_that_is_listed_before_it_and_like_it():
         Configuration.model_validate({"chosen": "none"})
 
 
-def test_all_tissues_can_be_fitted(root, monkeypatch):
-    monkeypatch.chdir(root)
-    tissues = load_tissues(root / "config" / "tissues.yaml")
+def test_all_tissues_can_be_fitted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tissues = load_tissues()
+    require_measurable(tissues, 1.0)
     assert {"glial_1", "glial_2", "glial_3", "fibroblast", "corneal"} <= set(tissues)
 
 
@@ -138,9 +140,8 @@ def test_a_tissue_needs_a_measurement():
         Tissue.model_validate({"description": "x", "mould": "y"})
 
 
-def test_a_tissue_without_ratios_is_simulated_and_not_fitted(root, monkeypatch):
-    monkeypatch.chdir(root)
-    tenocyte = load_tissues(root / "config" / "tissues.yaml", ("tenocyte",))
+def test_a_tissue_without_ratios_is_simulated_and_not_fitted():
+    tenocyte = load_tissues(names=("tenocyte",))
     assert not tenocyte["tenocyte"].measured
     require_measured({}, tenocyte)
     with pytest.raises(RaptorError, match=r"name it in fit\.unmeasured"):

@@ -26,9 +26,9 @@ from raptor.imaging.illumination import fit_light
 from raptor.imaging.overlay import overlay_figure, write_overlay
 from raptor.imaging.tissue import without_specks
 from raptor.moulds import Circle, Mould, mould_image, read_mould
-from tests.photograph import CASES, MOULDS, Camera, contracted, coverage, photograph
+from tests.photograph import CASES, Camera, contracted, coverage, photograph
 
-MOULD = read_mould(MOULDS / "four_post_rectangle.geojson")
+MOULD = read_mould("four_post_rectangle")
 TISSUE = contracted(MOULD, 0.35, 0.08, 0.02, seed=1)
 CAMERA = Camera(angle=17)
 
@@ -172,7 +172,7 @@ def test_bright_and_dark_share_the_depression(pixels):
 
 
 def test_what_cannot_be_measured_is_refused(pixels):
-    other = read_mould(MOULDS / "glial_3.geojson")
+    other = read_mould("glial_3")
     with pytest.raises(RaptorError, match="does not have the shape of glial_3"):
         measured(pixels, other)
     empty = shapely.box(0, 0, 0.1, 0.1)
@@ -287,7 +287,7 @@ def test_the_overlay_shows_ratios_and_threshold(pixels, tmp_path):
 def test_the_command_writes_what_it_measures(pixels, tmp_path):
     image, overlay, outline = (tmp_path / name for name in ("photo.png", "overlay.png", "outline.geojson"))
     io.imsave(image, pixels, check_contrast=False)
-    arguments = ["measure", str(image), "--mould", str(MOULDS / "four_post_rectangle.geojson")]
+    arguments = ["measure", str(image), "--mould", "four_post_rectangle"]
     run = CliRunner().invoke(
         app, [*arguments, "--json", "--overlay", str(overlay), "--outline", str(outline)]
     )

@@ -14,7 +14,7 @@ from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.frame import pixel_centres
 from raptor.moulds import Circle, Mould, PolygonTether, read_mould
-from raptor.moulds.library import STANDARD
+from raptor.moulds.library import MOULDS
 from raptor.moulds.summary import summarise, symmetry_class
 
 ROOT = Path(__file__).parents[2]
@@ -61,9 +61,9 @@ def apart(mould, other):
     return mould.depression.symmetric_difference(other.depression).area / other.depression.area
 
 
-@pytest.mark.parametrize("name", STANDARD)
+@pytest.mark.parametrize("name", MOULDS)
 def test_an_svg_holds_the_same_cells(name, tmp_path):
-    mould = STANDARD[name]()
+    mould = read_mould(name)
     path = tmp_path / f"{name}.svg"
     path.write_text(as_svg(mould))
     drawn = read_mould(path)
@@ -76,7 +76,7 @@ def test_an_svg_holds_the_same_cells(name, tmp_path):
 @pytest.mark.parametrize("name", ["four_post_rectangle", "free_square", "i_shape", "glial_2", "corneal"])
 @pytest.mark.parametrize(("pixels", "dark"), [(400, 0), (512, 90), (1000, 0)])
 def test_a_png_holds_the_same_cells_within_a_hundredth(name, pixels, dark, tmp_path):
-    mould = STANDARD[name]()
+    mould = read_mould(name)
     painted = read_mould(save(tmp_path / f"{name}.png", paint(mould, pixels, dark)))
     assert len(cast_sites(painted, 7)) == pytest.approx(len(cast_sites(mould, 7)), rel=0.01)
     # A wall lies within half a pixel and the simplification's half a pixel of where it was.
@@ -122,8 +122,8 @@ def test_up_is_up_in_every_format(tmp_path):
 
 
 def test_symmetry_is_found_from_the_shape():
-    for make in STANDARD.values():
-        assert symmetry_class(make()) == make().symmetry
+    for mould in map(read_mould, MOULDS):
+        assert symmetry_class(mould) == mould.symmetry
     post = Circle(5.0, 3.0, 1.0)
     box = shapely.box(-20, -10, 20, 10)
     assert symmetry_class(Mould(box, (post,))) == "none"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from raptor.core.errors import RaptorError
 from raptor.moulds import Circle, Mould, PolygonTether, mould_image, read_mould, read_moulds, write_moulds
-from raptor.moulds.library import STANDARD
+from raptor.moulds.library import MOULDS
 from raptor.moulds.random_moulds import GROUPS, RandomMoulds
 from raptor.symmetry import Element
 
@@ -52,11 +52,13 @@ def looks_alike(mould, element):
     return moved.outline.symmetric_difference(mould.outline).area < 1e-6 and posts == moved_posts
 
 
-def test_standard_moulds_stand_in_the_configuration(pytestconfig):
-    folder = pytestconfig.rootpath / "config" / "moulds"
-    assert {path.stem for path in folder.glob("*.geojson")} == set(STANDARD)
-    for name, make in STANDARD.items():
-        assert read_mould(folder / f"{name}.geojson") == make()
+def test_the_library_is_known_by_name_in_every_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert {"four_post_rectangle", "i_shape", "glial_1", "corneal"} <= set(MOULDS)
+    for name in MOULDS:
+        assert read_mould(name).name == name
+    with pytest.raises(RaptorError, match="did you mean 'glial_1'"):
+        read_mould("glial1")
 
 
 def test_moulds_survive_writing_and_reading(tmp_path):

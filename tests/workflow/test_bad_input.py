@@ -6,7 +6,7 @@ import yaml
 from tests.workflow.test_end_to_end import variant
 
 CASE = {
-    "name": "one", "mould": "config/moulds/small_rectangle.geojson",
+    "name": "one", "mould": "small_rectangle",
     "delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3,
 }  # fmt: skip
 

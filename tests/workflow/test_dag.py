@@ -5,6 +5,7 @@ import subprocess
 import pytest
 import yaml
 
+from raptor.moulds.library import TISSUES
 from tests.small import ROOT
 from tests.workflow.conftest import TINY
 from tests.workflow.test_end_to_end import variant
@@ -48,7 +49,7 @@ def test_a_lost_report_is_written_again(place):
 
 
 def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
-    tissues = yaml.safe_load((place.folder / "config" / "tissues.yaml").read_text())
+    tissues = yaml.safe_load(TISSUES.read_text())
     tissues["glial_1"]["area_ratio"] = 0.7
     path = tmp_path / "tissues.yaml"
     path.write_text(yaml.safe_dump(tissues))

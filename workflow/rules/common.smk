@@ -10,6 +10,8 @@ from raptor.core.version import MODEL_VERSION
 from raptor.surrogate.baselines import BASELINES
 from raptor.core.compiled import source_hash
 from raptor.core.errors import RaptorError
+from raptor.moulds.library.tissues import load_tissues, require_measured
+from raptor.moulds.reading import find_mould
 
 if "name" not in config:
     raise WorkflowError(
@@ -17,13 +19,10 @@ if "name" not in config:
     )
 try:
     CONFIG = configuration.parse(config, "configuration")
-    TISSUES = configuration.load_tissues(
-        Path(CONFIG.fit.tissues_file), CONFIG.fit.tissues, CONFIG.fit.mould_scale
-    )
-    UNMEASURED = configuration.load_tissues(
-        Path(CONFIG.fit.tissues_file), CONFIG.fit.unmeasured, CONFIG.fit.mould_scale
-    )
-    configuration.require_measured(TISSUES, UNMEASURED)
+    TISSUES = load_tissues(CONFIG.fit.tissues_file, CONFIG.fit.tissues)
+    UNMEASURED = load_tissues(CONFIG.fit.tissues_file, CONFIG.fit.unmeasured)
+    require_measured(TISSUES, UNMEASURED)
+    configuration.require_measurable(TISSUES | UNMEASURED, CONFIG.fit.mould_scale)
     configuration.require_castable(CONFIG.tradeoff.cases, CONFIG.sweep)
 except RaptorError as error:
     raise WorkflowError(str(error))

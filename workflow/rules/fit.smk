@@ -12,7 +12,7 @@ SIMULATOR = {
 rule fit_tissue:
     """Fit the three parameters to a tissue by the surrogate, correct them by a few simulations, simulate again."""
     input:
-        mould=lambda wildcards: TISSUES[wildcards.tissue].mould,
+        mould=lambda wildcards: find_mould(TISSUES[wildcards.tissue].mould),
         weights=SURROGATE["weights"],
         model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
@@ -116,7 +116,7 @@ rule fit_joint:
     """Fit several tissues with common parameters, by the surrogate and by the simulator."""
     input:
         fits=expand(rules.fit_tissue.output.fit, tissue=CONFIG.fit.joint),
-        moulds=[TISSUES[tissue].mould for tissue in CONFIG.fit.joint],
+        moulds=[find_mould(TISSUES[tissue].mould) for tissue in CONFIG.fit.joint],
         weights=SURROGATE["weights"],
         model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
@@ -175,7 +175,7 @@ rule fit_outline:
 rule simulate_unmeasured:
     """Simulate a tissue of which only delta is known, over the range of spring constants."""
     input:
-        mould=lambda wildcards: UNMEASURED[wildcards.unmeasured].mould,
+        mould=lambda wildcards: find_mould(UNMEASURED[wildcards.unmeasured].mould),
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         table=report(

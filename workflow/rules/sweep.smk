@@ -4,7 +4,7 @@
 rule design_sweep:
     """A run for every point and seed of a mould's sweep."""
     input:
-        mould=lambda wildcards: SWEEPS[wildcards.sweep],
+        mould=lambda wildcards: find_mould(SWEEPS[wildcards.sweep]),
     output:
         design=f"{RESULTS}/sweeps/{{sweep}}/design.csv",
         moulds=f"{RESULTS}/sweeps/{{sweep}}/moulds.geojson",

@@ -4,7 +4,7 @@
 rule measure_tradeoff:
     """Cost and errors of each method on one mould and one set of parameters."""
     input:
-        mould=lambda wildcards: CASES[wildcards.case].mould,
+        mould=lambda wildcards: find_mould(CASES[wildcards.case].mould),
         surrogate=lambda wildcards: (
             [SURROGATE["weights"], SURROGATE["model"]]
             if CONFIG.comparison(CASES[wildcards.case])["surrogate"]
@@ -54,7 +54,7 @@ rule tabulate_tradeoff:
 rule plot_folding:
     """One tissue as it contracts, and folded by an anneal."""
     input:
-        mould=CASES[CONFIG.tradeoff.folding_case].mould,
+        mould=find_mould(CASES[CONFIG.tradeoff.folding_case].mould),
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         png=report(

@@ -20,5 +20,5 @@ with logged(snakemake.log[0]):
             simulation_configuration=snakemake.params.simulation_configuration,
             configuration=snakemake.params.configuration,
             device=chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0)),
-            advance=lambda row: advance(f"sample {row}"),
+            on_progress=lambda row: advance(f"sample {row}"),
         )

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 import typer
 
 from raptor.cli.options import (
-    TISSUES,
     Delta,
     Json,
     KappaNNN,
@@ -20,6 +19,7 @@ from raptor.cli.options import (
     require_writable,
 )
 from raptor.core.errors import RaptorError
+from raptor.moulds.library import TISSUES
 
 By = Literal["surrogate", "simulator"]
 
@@ -64,13 +64,13 @@ def fit(
 ) -> None:
     """Fit delta, kappa_nnn and kappa_nnnn to a tissue in its mould, and say what is left open.
 
-    Give what was measured: one or both ratios, a tissue's name for those of config/tissues.yaml, or a picture
+    Give what was measured: one or both ratios, a tissue's name for those of the library, or a picture
     of the tissue for its whole outline. Two ratios cannot determine three parameters: the intervals in the
     output are those of the valley (docs/fits.md). By the simulator, the search starts at the surrogate's fit,
     or at the parameters given, and then needs no surrogate.
 
     Example:
-      raptor fit config/moulds/glial_1.geojson --tissue glial_1 --output fit.json
+      raptor fit glial_1 --tissue glial_1 --output fit.json
       raptor fit mould.svg --area-ratio 0.75 --width-ratio 0.70
           --output fit.json --picture fit.png
       raptor fit mould.svg --outline tissue.png --by simulator --output fit.json
@@ -130,9 +130,9 @@ def _target(
     if outline is not None:
         return read_outline(outline)
     if tissue is not None:
-        from raptor.config import load_tissue
+        from raptor.moulds.library.tissues import tissue as tissue_named
 
-        found = load_tissue(tissues, tissue)
+        found = tissue_named(tissue, tissues)
         if not found.measured:
             raise RaptorError(
                 f"tissue {tissue} has no measured ratio to fit; give --area-ratio or --width-ratio"

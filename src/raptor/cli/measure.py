@@ -37,7 +37,7 @@ def measure(
     """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask.
 
     Example:
-      raptor measure photograph.png --mould config/moulds/four_post_rectangle.geojson
+      raptor measure photograph.png --mould four_post_rectangle
           --overlay overlay.png --outline tissue.geojson
     """
     from raptor import imaging

@@ -11,9 +11,10 @@ import numpy as np
 import typer
 
 from raptor.core.errors import RaptorError
+from raptor.moulds.library import TISSUES
 from raptor.parameters import CellParameters
 
-Mould = Annotated[Path, typer.Argument(help="mould: GeoJSON, SVG or PNG (docs/moulds.md)")]
+Mould = Annotated[Path, typer.Argument(help="a mould of the library by name, or a GeoJSON, SVG or PNG file")]
 Scale = Annotated[
     float | None,
     typer.Option(
@@ -29,7 +30,6 @@ Tissue = Annotated[
     typer.Option(help="tissue whose fitted parameters to take, such as glial_1; a flag goes before them"),
 ]
 Tissues = Annotated[Path, typer.Option(help="where tissues are described")]
-TISSUES = Path("config/tissues.yaml")
 Output = Annotated[Path, typer.Option(help="netCDF file to write")]
 Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write, PNG or SVG")]
 Json = Annotated[bool, typer.Option("--json", help="print numbers as JSON, for scripts")]
@@ -54,9 +54,9 @@ def cell_parameters(
     names = [field.name for field in fields(CellParameters)]
     given = {name: value for name, value in zip(names, values, strict=True) if value is not None}
     if tissue is not None:
-        from raptor.config import load_tissue
+        from raptor.moulds.library.tissues import tissue as tissue_named
 
-        return load_tissue(tissues, tissue).parameters(tissue, given)
+        return tissue_named(tissue, tissues).parameters(tissue, given)
     missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]
     if missing:
         raise RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")

@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from raptor.cli.options import (
-    TISSUES,
     Delta,
     Json,
     KappaNNN,
@@ -22,6 +21,7 @@ from raptor.cli.options import (
     require_picture_writable,
     require_writable,
 )
+from raptor.moulds.library import TISSUES
 
 
 def predict(
@@ -45,7 +45,7 @@ def predict(
     Says so where mould or parameters are unlike what the surrogate was trained on.
 
     Example:
-      raptor predict config/moulds/four_post_rectangle.geojson
+      raptor predict four_post_rectangle
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3
           --output tissue.nc --picture tissue.png
     """

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from raptor.cli.options import (
-    TISSUES,
     Delta,
     Json,
     KappaNNN,
@@ -25,6 +24,7 @@ from raptor.cli.options import (
     require_writable,
 )
 from raptor.core.errors import RaptorError
+from raptor.moulds.library import TISSUES
 
 PIXELS = 256  # along a side of the image that shape is measured in and drawn (paper)
 
@@ -52,7 +52,7 @@ def simulate(
     Example:
       raptor simulate mould.svg --tissue glial_1
           --output tissue.nc --picture tissue.png
-      raptor simulate config/moulds/four_post_rectangle.geojson
+      raptor simulate four_post_rectangle
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3 --output tissue.nc
     """
     from raptor.condor import accuracy_named

@@ -2,16 +2,14 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from raptor.condor.simulate import accuracy_named
+from raptor.core.blocks import Block, Name, Positive, Weight
 from raptor.moulds.geometry import SMALLEST_TETHER
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, NetworkModel, largest_kappa_nnnn
 
 AccuracyName = Literal["draft", "standard", "reference"]
-Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
-Positive = Annotated[int, Field(ge=1)]
-Weight = Annotated[float, Field(ge=0)]
 
 
 def _accuracy(name: str) -> str:
@@ -20,12 +18,6 @@ def _accuracy(name: str) -> str:
 
 
 Method = Annotated[str, AfterValidator(_accuracy)]
-
-
-class Block(BaseModel):
-    """A block of the configuration: unknown keys are errors, values do not change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Design(Block):
@@ -215,7 +207,9 @@ class Further(Block):
 class Fit(Block):
     """Which tissues are fitted, and how."""
 
-    tissues_file: str = Field("config/tissues.yaml", description="measured tissues and their moulds")
+    tissues_file: str | None = Field(
+        None, description="measured tissues and their moulds; null: those that come with the package"
+    )
     tissues: tuple[Name, ...] = Field(("glial_1",), description="tissues to fit, by name")
     mould_scale: float = Field(
         0.7, gt=0, le=1.5, description="tissue moulds are drawn at this fraction of their size"

@@ -7,21 +7,10 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from raptor.condor.simulate import accuracy_named
-from raptor.config.blocks import (
-    Block,
-    Dataset,
-    Design,
-    Fields,
-    Fit,
-    Further,
-    Model,
-    Moulds,
-    Name,
-    Simulation,
-    Surrogate,
-)
+from raptor.config.blocks import Dataset, Design, Fields, Fit, Further, Model, Moulds, Simulation, Surrogate
 from raptor.config.sweep import Sweep
 from raptor.config.tradeoff import Tradeoff, TradeoffCase
+from raptor.core.blocks import Block, Name
 from raptor.core.device import Device
 from raptor.core.version import MODEL_VERSION, STACK_FORMAT
 from raptor.dataset.design import DesignRules

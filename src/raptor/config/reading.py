@@ -1,18 +1,19 @@
 """Reading of YAML files, and faults of validation as sentences."""
 
-from collections.abc import Iterator
-from difflib import get_close_matches
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from raptor.condor.lattice import cast_sites
 from raptor.config.configuration import Configuration
 from raptor.config.sweep import Sweep
 from raptor.config.tradeoff import TradeoffCase
+from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
+from raptor.fields.shape import central_section
+from raptor.moulds.library.tissues import Tissue
 from raptor.moulds.reading import read_mould
 
 
@@ -44,47 +45,24 @@ def require_castable(cases: tuple[TradeoffCase, ...], sweep: Sweep) -> None:
         Where a mould cannot.
     """
     for case in cases:
-        cast_sites(read_mould(Path(case.mould)), 1)
-    for path in sweep.moulds:
-        cast_sites(read_mould(Path(path)).scaled(sweep.mould_scale), 1)
+        cast_sites(read_mould(case.mould), 1)
+    for mould in sweep.moulds:
+        cast_sites(read_mould(mould).scaled(sweep.mould_scale), 1)
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
-    """The keys of a YAML file, or a RaptorError that says why there are none."""
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise RaptorError(f"{path} cannot be read: {error.strerror}; check the path") from error
-    except yaml.YAMLError as error:
-        raise RaptorError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise RaptorError(f"{path} holds no keys; see config/README.md for what it may hold")
-    return content
+def require_measurable(tissues: Mapping[str, Tissue], mould_scale: float) -> None:
+    """Find out before any work that the moulds of tissues can be cast, and their widths measured.
 
-
-def explain(error: ValidationError, where: str, model: type[BaseModel]) -> Iterator[str]:
-    """A sentence for each fault; an unknown key is named with its nearest known one."""
-    for fault in error.errors():
-        place = ".".join(str(part) for part in fault["loc"])
-        if fault["type"] == "extra_forbidden":
-            known = _keys_beside(model, fault["loc"])
-            near = get_close_matches(str(fault["loc"][-1]), known, 1)
-            hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
-            yield f"{where}: unknown key '{place}'; {hint}"
-        else:
-            message = fault["msg"].removeprefix("Value error, ")
-            given = f" (given: {fault['input']!r})" if fault["type"] != "value_error" else ""
-            yield f"{where}: {place + ': ' if place else ''}{message}{given}"
-
-
-def _keys_beside(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
-    """Names of the keys that may stand where an unknown one was found."""
-    for part in place[:-1]:
-        if isinstance(part, int):  # an item of a list: its model is known already
-            continue
-        block = model.model_fields[part].annotation
-        block = next((inner for inner in get_args(block) if isinstance(inner, type)), block)
-        if not (isinstance(block, type) and issubclass(block, BaseModel)):
-            return []
-        model = block
-    return list(model.model_fields)
+    Raises
+    ------
+    RaptorError
+        Where one cannot.
+    """
+    for name, tissue in tissues.items():
+        mould = read_mould(tissue.mould).scaled(mould_scale)
+        cast_sites(mould, 1)
+        if tissue.width_ratio is not None and not central_section(mould).intersects(mould.depression):
+            raise RaptorError(
+                f"tissue {name}: a width ratio is given, but tethers fill the central section of "
+                f"{tissue.mould}; leave the width out or change the mould"
+            )

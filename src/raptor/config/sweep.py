@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field, model_validator
 
-from raptor.config.blocks import Block, Positive
+from raptor.core.blocks import Block, Positive
 from raptor.dataset.sweep import Grid
 
 
@@ -12,7 +12,7 @@ class Sweep(Block):
     """Contraction over a grid of parameters, simulated and predicted."""
 
     moulds: tuple[str, ...] = Field(
-        ("config/moulds/four_post_rectangle.geojson", "config/moulds/i_shape.geojson"),
+        ("four_post_rectangle", "i_shape"),
         description="mould files, each swept over the whole grid",
     )
     mould_scale: float = Field(

@@ -2,7 +2,8 @@
 
 from pydantic import Field, model_validator
 
-from raptor.config.blocks import Block, Method, Name, Positive
+from raptor.config.blocks import Method
+from raptor.core.blocks import Block, Name, Positive
 from raptor.parameters import CellParameters, NetworkModel
 
 
@@ -23,7 +24,7 @@ class TradeoffCase(Block):
         return self
 
 
-SMALL = {"mould": "config/moulds/small_rectangle.geojson"}
+SMALL = {"mould": "small_rectangle"}
 
 
 class Tradeoff(Block):

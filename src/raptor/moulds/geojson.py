@@ -13,7 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, read_input
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
-PROPERTIES = ("mould", "tethers", "symmetry", "area")
+PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area")
 
 
 def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:

@@ -1,5 +1,6 @@
-"""One door for mould files: GeoJSON, SVG or PNG, by the file's suffix (docs/moulds.md)."""
+"""One door for moulds: a name of the library, or a GeoJSON, SVG or PNG file (docs/moulds.md)."""
 
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 
@@ -7,18 +8,37 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import read_input
 from raptor.moulds.geojson import read_geojson
 from raptor.moulds.geometry import Mould
+from raptor.moulds.library import MOULDS
 
 SUFFIXES = (".geojson", ".json", ".svg", ".png")
 """Suffixes of the files that `read_mould` reads."""
 
 
-def read_mould(path: Path, scale: float | None = None) -> Mould:
-    """Read a file that holds one mould.
+def find_mould(name: str | Path) -> Path:
+    """The file of a mould: the path given, or the library's file where that is the name of one.
+
+    Raises
+    ------
+    RaptorError
+        Where there is neither.
+    """
+    path = Path(name)
+    if path.suffix or path.exists():
+        return path
+    if str(name) not in MOULDS:
+        near = get_close_matches(str(name), MOULDS, 1)
+        hint = f"did you mean '{near[0]}'?" if near else f"the library has {', '.join(MOULDS)}"
+        raise RaptorError(f"mould '{name}' is neither a file nor a mould of the library; {hint}")
+    return MOULDS[str(name)]
+
+
+def read_mould(path: str | Path, scale: float | None = None) -> Mould:
+    """Read a mould of the library, or a file that holds one mould.
 
     Parameters
     ----------
-    path : Path
-        GeoJSON (.geojson, .json), SVG (.svg) or PNG (.png).
+    path : str or Path
+        Name of a standard mould, or a file: GeoJSON (.geojson, .json), SVG (.svg) or PNG (.png).
     scale : float, optional
         l0 a unit of the file: of a GeoJSON coordinate (1 where not given), of an SVG user unit, or of a
         pixel. A drawing with a scale is put in the middle of the frame; without one, its page is the frame
@@ -29,7 +49,7 @@ def read_mould(path: Path, scale: float | None = None) -> Mould:
     RaptorError
         Where the file is missing, unreadable, of another kind, or holds no mould that can be cast.
     """
-    path = Path(path)
+    path = find_mould(path)
     if scale is not None and not (isfinite(scale) and scale > 0):
         raise RaptorError(f"scale is {scale}; give a positive number of l0 a unit of {path.name}")
     suffix = path.suffix.lower()

@@ -1,4 +1,4 @@
-"""Measured tissues, to be fitted."""
+"""Measured tissues, and the moulds that they grew in (paper, "A summary of widths and areas")."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -9,12 +9,9 @@ from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from raptor.condor.lattice import cast_sites
-from raptor.config.blocks import Block
-from raptor.config.reading import explain, read_yaml
+from raptor.core.blocks import Block, explain, read_yaml
 from raptor.core.errors import RaptorError
-from raptor.fields.shape import central_section
-from raptor.moulds.reading import read_mould
+from raptor.moulds.library import TISSUES
 from raptor.parameters import CellParameters
 
 
@@ -22,7 +19,7 @@ class Tissue(Block):
     """A tissue and the mould it grew in: measured, or known by its delta alone."""
 
     description: str = Field(description="cells, gel and source of the measurement")
-    mould: str = Field(description="mould file, an approximation documented in it")
+    mould: str = Field(description="name of a mould of the library, or a mould file beside this one")
     area_ratio: float | None = Field(None, gt=0, le=1.5, description="A/A0")
     width_ratio: float | None = Field(None, gt=0, le=1.5, description="w/w0")
     paper: dict[str, float] = Field(default_factory=dict, description="the paper's fit")
@@ -42,6 +39,17 @@ class Tissue(Block):
             raise RaptorError(f"tissue {name} has no fitted {', '.join(missing)}; give a value yourself")
         return CellParameters(**{field: values[field] for field in names})
 
+    @property
+    def fit(self) -> CellParameters:
+        """The paper's fitted parameters.
+
+        Raises
+        ------
+        RaptorError
+            Where the paper gives none of them all.
+        """
+        return self.parameters(self.description)
+
     @model_validator(mode="after")
     def _measured(self) -> "Tissue":
         if not self.measured and "delta" not in self.paper:
@@ -57,22 +65,17 @@ class Tissue(Block):
         return self.area_ratio is not None or self.width_ratio is not None
 
 
-def load_tissues(
-    path: Path, names: tuple[str, ...] | None = None, mould_scale: float = 1.0
-) -> dict[str, Tissue]:
-    """Read tissues, all or those named; their moulds are cast and measured at the scale given.
+def load_tissues(path: str | Path | None = None, names: tuple[str, ...] | None = None) -> dict[str, Tissue]:
+    """Read tissues, all or those named, of the library or of another file; their moulds are not.
 
     Raises
     ------
     RaptorError
-        Where the file, a tissue in it or its mould cannot be used.
+        Where the file or a tissue in it cannot be used.
     """
-    content = read_yaml(Path(path))
-    chosen = {}
-    for name in names if names is not None else content:
-        chosen[name] = _tissue(content, name, path)
-        _require_measurable(chosen[name], name, mould_scale)
-    return chosen
+    path = Path(path or TISSUES)
+    content = read_yaml(path)
+    return {name: _tissue(content, name, path) for name in (content if names is None else names)}
 
 
 def require_measured(tissues: Mapping[str, Tissue], unmeasured: Mapping[str, Tissue]) -> None:
@@ -94,20 +97,15 @@ def require_measured(tissues: Mapping[str, Tissue], unmeasured: Mapping[str, Tis
             raise RaptorError(f"tissue {name} has no paper: {{delta: ...}} to be simulated at; give it one")
 
 
-def load_tissue(path: Path, name: str) -> Tissue:
-    """Read one tissue; its mould is not.
+def tissue(name: str, path: str | Path | None = None) -> Tissue:
+    """A measured tissue by name, of the library or of another file.
 
     Raises
     ------
     RaptorError
         Where the file or the tissue in it cannot be used.
     """
-    if not Path(path).is_file():
-        raise RaptorError(
-            f"{path}, in which tissues are described, does not exist; go to the project's folder, or name "
-            "another file by --tissues"
-        )
-    return _tissue(read_yaml(Path(path)), name, path)
+    return load_tissues(path, (name,))[name]
 
 
 def _tissue(content: dict[str, Any], name: str, path: Path) -> Tissue:
@@ -117,17 +115,8 @@ def _tissue(content: dict[str, Any], name: str, path: Path) -> Tissue:
         hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(content)}"
         raise RaptorError(f"{path} has no tissue '{name}'{hint}")
     try:
-        return Tissue.model_validate(content[name])
+        found = Tissue.model_validate(content[name])
     except ValidationError as error:
         raise RaptorError("; ".join(explain(error, f"{path}, {name}", Tissue))) from None
-
-
-def _require_measurable(tissue: Tissue, name: str, scale: float) -> None:
-    """Find out before any work that a tissue's mould can be cast, and its width measured."""
-    mould = read_mould(Path(tissue.mould)).scaled(scale)
-    cast_sites(mould, 1)
-    if tissue.width_ratio is not None and not central_section(mould).intersects(mould.depression):
-        raise RaptorError(
-            f"tissue {name}: a width ratio is given, but tethers fill the central section of "
-            f"{tissue.mould}; leave the width out or change the mould"
-        )
+    beside = path.parent / found.mould
+    return found.model_copy(update={"mould": str(beside)}) if beside.is_file() else found

@@ -16,7 +16,7 @@ from benchmarks.solvers import (
     posted_rectangle,
     time_against_cells,
 )
-from raptor.condor import simulate
+from raptor.condor.simulate import simulate
 from raptor.condor.system import build_system
 from raptor.moulds import Mould, read_mould
 from raptor.parameters import CellParameters, NetworkModel

@@ -26,21 +26,20 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.kernels import OPERATIONS
-from raptor.condor import simulate
 from raptor.condor.gpu.contract import BatchSolver, Task, room_for_cells
 from raptor.condor.gpu.energy import objective
 from raptor.condor.gpu.layout import BLOCK, build_batch, cast
 from raptor.condor.gpu.raster import rasterise as rasterise_on
-from raptor.condor.simulate import Simulation
+from raptor.condor.simulate import Tissue, simulate
 from raptor.config import Configuration, load
 from raptor.core.device import chosen_device
 from raptor.core.files import atomic_path
 from raptor.dataset.design import Run, sample_design
 from raptor.dataset.scaling import Scaling
 from raptor.fields.metrics import vrmse
-from raptor.fields.raster import rasterise
 from raptor.moulds.geometry import Mould
 from raptor.parameters import NetworkModel
+from raptor.raster import rasterise
 from raptor.surrogate.networks import Architecture, Generator
 from raptor.surrogate.training import TrainingRules, samples_a_second
 from raptor.symmetry import FIELDS
@@ -82,7 +81,7 @@ class Timed:
     raster_seconds: float
 
 
-def _single(job: tuple[Mould, Run, NetworkModel, int]) -> Simulation:
+def _single(job: tuple[Mould, Run, NetworkModel, int]) -> Tissue:
     mould, run, model, seed = job
     return simulate(mould, run.parameters, model, "standard", seed)
 
@@ -94,12 +93,12 @@ def in_processes(work: Callable[..., Any], jobs: Sequence[Any]) -> list[Any]:
 
 
 def agreement(
-    tasks: list[Task], singles: list[Simulation], model: NetworkModel, pixels: int, device: torch.device
+    tasks: list[Task], singles: list[Tissue], model: NetworkModel, pixels: int, device: torch.device
 ) -> Agreement:
     """Hold a batch against single runs, two seeds of each task one after the other."""
     together = dict(BatchSolver(tasks, model, "standard", device).run())
 
-    def density(tissue: Simulation) -> NDArray[np.float64]:
+    def density(tissue: Tissue) -> NDArray[np.float64]:
         return np.asarray(rasterise(tissue.positions, tissue.orientation, tissue.tension, pixels)[0])
 
     energies, others, errors, floor = [], [], [], []

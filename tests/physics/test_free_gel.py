@@ -5,10 +5,10 @@ import pytest
 import shapely
 from scipy.optimize import brentq, minimize
 
-from raptor.condor import simulate
 from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.network import build_network
+from raptor.condor.simulate import simulate
 from raptor.condor.walls import NO_WALLS
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel

@@ -5,7 +5,6 @@ import pytest
 import shapely
 import torch
 
-from raptor.condor import simulate
 from raptor.condor.contract import agitation_temperature
 from raptor.condor.energy import cell_tension as tension_of_one
 from raptor.condor.energy import inverted_fraction, unit_orientations
@@ -16,16 +15,17 @@ from raptor.condor.gpu.contract import BatchSolver, Task
 from raptor.condor.gpu.energy import cell_tension, objective, reversed_bonds, units
 from raptor.condor.gpu.layout import BLOCK, ROW, build_batch, cast, join
 from raptor.condor.gpu.raster import rasterise as rasterise_on
+from raptor.condor.simulate import simulate
 from raptor.condor.system import build_system, cast_state
 from raptor.core.errors import RaptorError
 from raptor.dataset import run as running
 from raptor.dataset.check import check_shard
 from raptor.dataset.design import sample_design
 from raptor.dataset.shards import read_shard, write_shard
-from raptor.fields.raster import rasterise
 from raptor.fields.shape import area_ratio, density_threshold
 from raptor.moulds import Circle, Mould, mould_image
 from raptor.parameters import CellParameters, NetworkModel
+from raptor.raster import rasterise
 from tests.small import CONFIG
 
 SWEEPS = 100

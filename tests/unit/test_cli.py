@@ -235,10 +235,10 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path):
 @pytest.mark.parametrize("what", ["ratios", "outline"])
 def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
     """The tissue that is fitted is one of the simulator's own, a little off the start."""
-    from raptor.condor import simulate
-    from raptor.fields.raster import rasterise
+    from raptor.condor.simulate import simulate
     from raptor.fields.shape import density_threshold, shape_ratios
     from raptor.parameters import CellParameters, NetworkModel
+    from raptor.raster import rasterise
 
     mould = read_mould(Path(MOULD))
     made = simulate(mould, CellParameters(0.35, 0.5, 0.3), NetworkModel(1), "draft", 3)
@@ -321,9 +321,8 @@ def test_the_shipped_model_predicts_without_training(tmp_path):
     size = sum(path.stat().st_size for path in SHIPPED.iterdir())
     assert size < 20e6
     output, picture = tmp_path / "prediction.nc", tmp_path / "prediction.png"
-    mould = ROOT / "config" / "moulds" / "four_post_rectangle.geojson"
     done = raptor(
-        "predict", mould, *options(), "--output", output, "--picture", picture, "--json"
+        "predict", "four_post_rectangle", *options(), "--output", output, "--picture", picture, "--json"
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

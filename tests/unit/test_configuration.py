@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from raptor.config import Configuration, load, require_measurable
 from raptor.config.reference import key_table, write_reference
 from raptor.core.errors import RaptorError
-from raptor.moulds.library.tissues import Tissue, load_tissues, require_measured
+from raptor.moulds.library.tissues import MeasuredTissue, load_tissues, require_measured
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ def test_a_bad_configuration_is_named(tmp_path, text, message):
 
 def test_a_tissue_needs_a_measurement():
     with pytest.raises(ValueError, match="neither area_ratio nor width_ratio"):
-        Tissue.model_validate({"description": "x", "mould": "y"})
+        MeasuredTissue.model_validate({"description": "x", "mould": "y"})
 
 
 def test_a_tissue_without_ratios_is_simulated_and_not_fitted():
@@ -146,7 +146,7 @@ def test_a_tissue_without_ratios_is_simulated_and_not_fitted():
     require_measured({}, tenocyte)
     with pytest.raises(RaptorError, match=r"name it in fit\.unmeasured"):
         require_measured(tenocyte, {})
-    measured = Tissue.model_validate({"description": "x", "mould": "y", "area_ratio": 0.5})
+    measured = MeasuredTissue.model_validate({"description": "x", "mould": "y", "area_ratio": 0.5})
     with pytest.raises(RaptorError, match="has no paper"):
         require_measured({}, {"x": measured})
 

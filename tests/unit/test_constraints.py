@@ -6,10 +6,10 @@ import shapely
 import torch
 
 from raptor.dataset.scaling import Scaling
-from raptor.fields.raster import rasterise
 from raptor.fields.resample import pooled, refined
 from raptor.moulds import Circle, Mould, mould_image
 from raptor.parameters import CellParameters
+from raptor.raster import rasterise
 from raptor.surrogate import constraints
 from raptor.surrogate.batches import apply
 from raptor.surrogate.inference import Surrogate

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from raptor.core.errors import RaptorError
-from raptor.fields.raster import SIGMA, normalised, rasterise
 from raptor.frame import IMAGE_SIZE
+from raptor.raster import SIGMA, normalised, rasterise
 from tests import naive
 
 

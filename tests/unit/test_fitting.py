@@ -9,9 +9,8 @@ import shapely
 from PIL import Image
 from scipy.stats import qmc
 
-from raptor.condor import simulate
+from raptor.condor.simulate import simulate
 from raptor.core.errors import RaptorError
-from raptor.fields.raster import rasterise
 from raptor.fields.shape import density_threshold, shape_ratios
 from raptor.fitting import (
     Outline,
@@ -49,6 +48,7 @@ from raptor.fitting.targets import as_array, prior_density
 from raptor.frame import pixel_centres
 from raptor.moulds import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters, NetworkModel
+from raptor.raster import rasterise
 
 TRUTH = CellParameters(0.6, 0.4, 0.2)
 BOX = Mould(shapely.box(-12, -6, 12, 6))

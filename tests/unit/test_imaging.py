@@ -12,15 +12,15 @@ from raptor.core.errors import RaptorError
 from raptor.fields.shape import area_ratio, outline_ratios, width_ratio
 from raptor.frame import pixel_centres
 from raptor.imaging import (
-    Tissue,
+    Appearance,
     aligned,
+    appearance_named,
     as_picture,
     from_landmarks,
     measure,
     parse_landmarks,
     read_picture,
     register,
-    tissue_named,
 )
 from raptor.imaging.illumination import fit_light
 from raptor.imaging.overlay import overlay_figure, write_overlay
@@ -59,7 +59,7 @@ def test_both_ratios_of_a_known_tissue_are_found_within_a_hundredth(case):
     assert found.width_ratio == pytest.approx(width, abs=0.01)
     assert found.registration.scale == pytest.approx(case.camera.scale, rel=1e-3)
     looks_bright = case.camera.tissue > case.camera.floor
-    assert found.tissue is (Tissue.BRIGHT if looks_bright else Tissue.DARK)
+    assert found.tissue is (Appearance.BRIGHT if looks_bright else Appearance.DARK)
 
 
 def test_a_drawing_without_noise_is_measured():
@@ -146,7 +146,11 @@ def test_an_aligned_mask_measures_what_the_density_does():
 
 def test_a_mask_of_a_turned_camera_is_measured_by_landmarks():
     mask = coverage(TISSUE, CAMERA) > 0.5
-    for values, tissue in ((mask, Tissue.AUTO), (~mask, Tissue.DARK), (np.where(mask, 7, 3), Tissue.BRIGHT)):
+    for values, tissue in (
+        (mask, Appearance.AUTO),
+        (~mask, Appearance.DARK),
+        (np.where(mask, 7, 3), Appearance.BRIGHT),
+    ):
         picture = as_picture(values, "mask")
         assert picture.mask
         found = measure(picture, MOULD, register(picture, MOULD, tethers_seen(CAMERA)), tissue)
@@ -165,10 +169,12 @@ def test_the_threshold_moves_the_outline(pixels):
 
 
 def test_bright_and_dark_share_the_depression(pixels):
-    bright, dark = (measured(pixels, tissue=tissue).area_ratio for tissue in (Tissue.BRIGHT, Tissue.DARK))
+    bright, dark = (
+        measured(pixels, tissue=tissue).area_ratio for tissue in (Appearance.BRIGHT, Appearance.DARK)
+    )
     assert bright + dark == pytest.approx(1, abs=0.01)
     with pytest.raises(RaptorError, match="allowed are bright, dark and auto"):
-        tissue_named("pink")
+        appearance_named("pink")
 
 
 def test_what_cannot_be_measured_is_refused(pixels):

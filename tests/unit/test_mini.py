@@ -19,9 +19,9 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.provenance import trace_example, trace_simulation
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples
-from raptor.fields.raster import rasterise
 from raptor.moulds import moulds_by_id
 from raptor.parameters import CellParameters, NetworkModel
+from raptor.raster import rasterise
 from raptor.symmetry import Element, apply
 from tests.small import MINI, ROOT
 

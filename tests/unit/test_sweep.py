@@ -72,7 +72,7 @@ def test_measured_are_the_ratios_of_each_simulation(small_mould, tmp_path):
     table = measure([tmp_path / "0.nc"], small_mould, MODEL.layers, 64)
     assert table["delta"].tolist() == [0.2, 0.9]
     assert table["area_ratio"].is_monotonic_decreasing
-    from raptor.fields.raster import rasterise
+    from raptor.raster import rasterise
 
     s = simulations[1]
     density = rasterise(s.positions, s.orientation, s.tension, 64)[0]

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from raptor.fields.raster import rasterise
+from raptor.raster import rasterise
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 ELEMENTS = Element.all()

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import shapely
 
-from raptor.condor import simulate
+from raptor.condor.simulate import simulate
 from raptor.core.compiled import source_hash
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged
-from raptor.fields.raster import rasterise
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
+from raptor.raster import rasterise
 
 with logged(snakemake.log[0]):
     started = time.perf_counter()

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.condor import build_lattice
 from raptor.condor.energy import reversed_share
+from raptor.condor.lattice import build_lattice
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
 from raptor.moulds import read_mould

@@ -45,7 +45,7 @@ def measure(
     from raptor.imaging.report import as_feature, as_record, as_sentence
     from raptor.moulds import read_mould
 
-    appearance, shape = imaging.tissue_named(look), read_mould(mould, scale)
+    appearance, shape = imaging.appearance_named(look), read_mould(mould, scale)
     for output, other in ((overlay, outline), (outline, overlay)):
         if output is not None:
             require_writable(output, image, mould, other, kind="a file")

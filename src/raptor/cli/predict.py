@@ -49,7 +49,7 @@ def predict(
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3
           --output tissue.nc --picture tissue.png
     """
-    from raptor.condor import cast_sites
+    from raptor.condor.lattice import cast_sites
     from raptor.moulds import read_mould
     from raptor.surrogate.files import SHIPPED, load, write_prediction
 

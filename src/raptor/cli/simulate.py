@@ -55,15 +55,15 @@ def simulate(
       raptor simulate four_post_rectangle
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3 --output tissue.nc
     """
-    from raptor.condor import accuracy_named
-    from raptor.condor import simulate as run_simulation
+    from raptor.condor.simulate import accuracy_named
+    from raptor.condor.simulate import simulate as run_simulation
     from raptor.config import content_hash
     from raptor.dataset.design import Run
     from raptor.dataset.shards import write_shard
-    from raptor.fields.raster import rasterise
     from raptor.fields.shape import shape_ratios
     from raptor.moulds import read_mould
     from raptor.parameters import NetworkModel
+    from raptor.raster import rasterise
 
     parameters = cell_parameters(delta, kappa_nnn, kappa_nnnn, tissue, tissues)
     model = NetworkModel(layers)

@@ -90,7 +90,7 @@ def accuracy_named(name: str) -> Accuracy:
 
 
 @dataclass(frozen=True)
-class Simulation:
+class Tissue:
     """A simulated tissue and how it was reached.
 
     Parameters
@@ -147,7 +147,7 @@ def simulate(
     model: NetworkModel,
     accuracy: str | Accuracy = "standard",
     seed: int = 0,
-) -> Simulation:
+) -> Tissue:
     """Cast a mould, let it contract, and return the tissue.
 
     The result hangs on the arguments alone; the seed sets the first orientations and every
@@ -169,7 +169,7 @@ def simulate(
     touching = _contact_energy(minimum, system, parameters.delta)
     if not mould.tethers:
         state = undrifted(state, lattice.sites, mould)
-    return Simulation(
+    return Tissue(
         sites=lattice.sites,
         positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
         orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),

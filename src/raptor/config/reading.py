@@ -13,7 +13,7 @@ from raptor.config.tradeoff import TradeoffCase
 from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
 from raptor.fields.shape import central_section
-from raptor.moulds.library.tissues import Tissue
+from raptor.moulds.library.tissues import MeasuredTissue
 from raptor.moulds.reading import read_mould
 
 
@@ -50,7 +50,7 @@ def require_castable(cases: tuple[TradeoffCase, ...], sweep: Sweep) -> None:
         cast_sites(read_mould(mould).scaled(sweep.mould_scale), 1)
 
 
-def require_measurable(tissues: Mapping[str, Tissue], mould_scale: float) -> None:
+def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float) -> None:
     """Find out before any work that the moulds of tissues can be cast, and their widths measured.
 
     Raises

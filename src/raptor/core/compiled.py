@@ -15,7 +15,7 @@ FAST_MATH = {"contract", "reassoc", "nsz", "arcp"}
 def source_hash() -> str:
     """Hash of all the package's kernel sources: what compiled code, and so a result, hangs on."""
     package = Path(__file__).parents[1]
-    kernels = ("core/compiled.py", "fields/raster.py", "condor/*.py")
+    kernels = ("core/compiled.py", "raster.py", "condor/*.py")
     sources = [path for pattern in kernels for path in sorted(package.glob(pattern))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 

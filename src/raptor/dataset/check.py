@@ -22,12 +22,12 @@ from raptor.dataset.netcdf import open_file
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
-from raptor.fields.raster import DEEP
 from raptor.frame import pixel_size
 from raptor.moulds.geojson import moulds_by_id, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.moulds.reading import read_mould
+from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32

@@ -9,9 +9,9 @@ from raptor.dataset.examples import read_examples
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures, shard_paths
 from raptor.dataset.stack import LONG_NAMES, read_table
-from raptor.fields.raster import SIGMA
 from raptor.frame import pixel_size
 from raptor.moulds.geojson import moulds_by_id
+from raptor.raster import SIGMA
 from raptor.symmetry import Element
 
 MADE_BY = (

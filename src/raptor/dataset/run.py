@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raptor.condor.simulate import Simulation, accuracy_named, simulate
+from raptor.condor.simulate import Tissue, accuracy_named, simulate
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.moulds.geometry import Mould
@@ -29,8 +29,8 @@ def simulate_shard(
     model: NetworkModel,
     accuracy: str,
     device: str = "cpu",
-    on_progress: Callable[[Run, Simulation | str], None] = lambda run, outcome: None,
-) -> tuple[dict[int, Simulation], dict[int, str]]:
+    on_progress: Callable[[Run, Tissue | str], None] = lambda run, outcome: None,
+) -> tuple[dict[int, Tissue], dict[int, str]]:
     """Simulate runs; returns simulations and reasons of failure, by id.
 
     On the processor one after another; on a GPU many at once, where the accuracy contracts and does no
@@ -55,7 +55,7 @@ def simulate_shard(
     return simulations, failures
 
 
-def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Simulation | str:
+def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy: str) -> Tissue | str:
     """The simulation of a run, or why it failed."""
     try:
         made = simulate(moulds[run.mould], run.parameters, model, accuracy, run.seed)
@@ -73,8 +73,8 @@ def _simulate_together(
     model: NetworkModel,
     accuracy: str,
     device: str,
-    on_progress: Callable[[Run, Simulation | str], None],
-) -> dict[int, Simulation]:
+    on_progress: Callable[[Run, Tissue | str], None],
+) -> dict[int, Tissue]:
     """Simulations of runs in one batch, by id; without those that cannot be cast or do not stay finite."""
     import torch  # here: a job on the processor need not wait for it
 
@@ -109,5 +109,5 @@ def _cast(mould: Mould, model: NetworkModel) -> "Cast | None":
         return None  # said again, and recorded, when the processor tries
 
 
-def _is_finite(simulation: Simulation) -> bool:
+def _is_finite(simulation: Tissue) -> bool:
     return bool(np.isfinite(simulation.energy) and np.isfinite(simulation.positions).all())

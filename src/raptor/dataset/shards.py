@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.condor.lattice import Lattice, connect
-from raptor.condor.simulate import Simulation, accuracy_named
+from raptor.condor.simulate import Tissue, accuracy_named
 from raptor.core.errors import RaptorError
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.design import Run
@@ -43,7 +43,7 @@ CELL_VARIABLES = {
 
 @dataclass(frozen=True)
 class Record:
-    """One simulation as read back from a shard; arrays as in `Simulation`."""
+    """One simulation as read back from a shard; arrays as in `Tissue`."""
 
     simulation: int
     parameters: CellParameters
@@ -82,7 +82,7 @@ class Shard:
 def write_shard(
     path: Path,
     runs: list[Run],
-    simulations: dict[int, Simulation],
+    simulations: dict[int, Tissue],
     model: NetworkModel,
     accuracy: str,
     configuration: str,
@@ -120,7 +120,7 @@ def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str, devic
     file.device = device  # on a GPU in single precision
 
 
-def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Simulation]) -> None:
+def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Tissue]) -> None:
     along = ("simulation",)
     ids = np.array([run.simulation for run in runs], dtype=np.int32)
     variable(file, "simulation", along, ids, "simulation id")
@@ -140,7 +140,7 @@ def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list
     variable(file, "wall_time", along, times, "wall time of the simulation", "s")
 
 
-def _columns(simulation: Simulation) -> NDArray[np.float64]:
+def _columns(simulation: Tissue) -> NDArray[np.float64]:
     """The cells' variables (cells, 10), in the order of `CELL_VARIABLES`."""
     return np.column_stack(
         [simulation.sites, simulation.positions, simulation.orientation, simulation.tension]

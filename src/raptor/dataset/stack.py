@@ -13,11 +13,11 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
 from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard, write_model
-from raptor.fields.raster import rasterise
 from raptor.frame import pixel_centres
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters
+from raptor.raster import rasterise
 from raptor.symmetry import FIELDS
 
 LONG_NAMES = {

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.raster import normalised
+from raptor.raster import normalised
 from raptor.symmetry import FIELDS
 
 BULK = ("P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar")

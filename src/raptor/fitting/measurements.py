@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.simulate import Simulation
+from raptor.condor.simulate import Tissue
 from raptor.fields.shape import area_ratio, long_axis, section_ratio, sections, width_ratio
 from raptor.fitting.targets import RATIOS
 from raptor.moulds.geometry import Mould
@@ -74,7 +74,7 @@ def seen(fields: NDArray[np.floating], mould: Mould, threshold: float) -> NDArra
     return np.array([area, width_ratio(density, mould, threshold), *widths, *means])
 
 
-def thickness_ratio(simulation: Simulation) -> float:
+def thickness_ratio(simulation: Tissue) -> float:
     """Thickness of a simulated tissue over that of the gel as cast: standard deviations of cells' heights.
 
     NaN of a single layer.

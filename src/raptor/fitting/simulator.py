@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.simulate import Simulation, simulate
-from raptor.fields.raster import rasterise
+from raptor.condor.simulate import Tissue, simulate
 from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import Minimum, Residuals, descend
 from raptor.fitting.targets import Measure, Target
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
+from raptor.raster import rasterise
 
 STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
 RESTART = 5  # evaluations left, with which another start can make a step
@@ -56,15 +56,15 @@ class Simulator:
         """The so many-th further seed; 0: that of fits."""
         return (self.seed + further) % 2**31
 
-    def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Simulation:
+    def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Tissue:
         """Simulate a tissue, with the seed of fits or the so many-th further one."""
         return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(further))
 
-    def fields(self, simulation: Simulation) -> NDArray[np.float64]:
+    def fields(self, simulation: Tissue) -> NDArray[np.float64]:
         """The eight fields (8, y, x) of a simulated tissue."""
         return rasterise(simulation.positions, simulation.orientation, simulation.tension, self.pixels)
 
-    def ratios(self, simulation: Simulation, mould: Mould) -> NDArray[np.float64]:
+    def ratios(self, simulation: Tissue, mould: Mould) -> NDArray[np.float64]:
         """A/A0 and w/w0 of a simulated tissue, (2,)."""
         return np.array(shape_ratios(self.fields(simulation)[0], mould, self.model.layers))
 
@@ -97,7 +97,7 @@ def descend_by_simulation(
 
 
 def measure_again(
-    simulations: Sequence[Simulation], simulator: Simulator, mould: Mould, target: Target
+    simulations: Sequence[Tissue], simulator: Simulator, mould: Mould, target: Target
 ) -> dict[str, Any]:
     """Means and standard deviations of ratios over simulations of one tissue, and the rss of the means.
 

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from time import perf_counter
 from typing import Any
 
-from raptor.condor.simulate import Simulation
+from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import Fit, minimise
 from raptor.fitting.simulator import ENOUGH, Simulator, measure_again
 from raptor.fitting.space_mapping import correct
@@ -23,7 +23,7 @@ def fit_tissue(
     starts: int,
     corrections: int,
     repeats: int,
-) -> tuple[Mapping[str, Any], Simulation]:
+) -> tuple[Mapping[str, Any], Tissue]:
     """Both fits as JSON holds them, and the first simulation, with a further seed, at the surrogate's.
 
     Parameters

@@ -6,15 +6,16 @@ from raptor.core.errors import RaptorError
 from raptor.imaging.pictures import Picture, as_picture, read_picture
 from raptor.imaging.registration import Registration, aligned, from_landmarks, parse_landmarks
 from raptor.imaging.rim import find_rim
-from raptor.imaging.tissue import Measurement, Tissue, measure, tissue_named
+from raptor.imaging.tissue import Appearance, Measurement, appearance_named, measure
 from raptor.moulds import Mould
 
 __all__ = [
+    "Appearance",
     "Measurement",
     "Picture",
     "Registration",
-    "Tissue",
     "aligned",
+    "appearance_named",
     "as_picture",
     "find_rim",
     "from_landmarks",
@@ -22,7 +23,6 @@ __all__ = [
     "parse_landmarks",
     "read_picture",
     "register",
-    "tissue_named",
 ]
 
 

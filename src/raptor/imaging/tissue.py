@@ -31,7 +31,7 @@ MAX_OUTSIDE = 0.05  # of a mask's tissue
 PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the two is tissue shows later
 
 
-class Tissue(StrEnum):
+class Appearance(StrEnum):
     """How the tissue looks beside the floor of the depression."""
 
     BRIGHT = "bright"
@@ -39,10 +39,10 @@ class Tissue(StrEnum):
     AUTO = "auto"
 
 
-def tissue_named(name: str) -> Tissue:
+def appearance_named(name: str) -> Appearance:
     """The look of a name; raises a RaptorError for another than bright, dark and auto."""
     try:
-        return Tissue(name)
+        return Appearance(name)
     except ValueError:
         raise RaptorError(f"tissue is {name}; allowed are bright, dark and auto") from None
 
@@ -60,7 +60,7 @@ class Measurement:
     threshold : float
         Brightness that parts tissue and floor: over that of the plate, uneven light taken out;
         0.5 for a mask.
-    tissue : Tissue
+    tissue : Appearance
         Bright or dark.
     contrast : float
         Difference of tissue and floor, in standard deviations within them; NaN for a mask.
@@ -75,7 +75,7 @@ class Measurement:
     area_ratio: float
     width_ratio: float
     threshold: float
-    tissue: Tissue
+    tissue: Appearance
     contrast: float
     brightness: NDArray[np.float64]
     read: NDArray[np.bool_]
@@ -86,7 +86,7 @@ def measure(
     picture: Picture,
     mould: Mould,
     registration: Registration,
-    tissue: Tissue = Tissue.AUTO,
+    tissue: Appearance = Appearance.AUTO,
     threshold: float | None = None,
 ) -> Measurement:
     """Outline, area and width of the tissue in a picture registered to its mould.
@@ -106,7 +106,7 @@ def measure(
         inside &= ~registration.covers(tether.polygon.buffer(margin), size)
     _require_in_picture(mould, registration, size, inside)
     if picture.mask:
-        tissue = Tissue.BRIGHT if tissue is Tissue.AUTO else tissue
+        tissue = Appearance.BRIGHT if tissue is Appearance.AUTO else tissue
         if threshold is not None:
             raise RaptorError("the image is a mask of two values; leave --threshold away")
         brightness, level, contrast = picture.values, 0.5, float("nan")
@@ -115,7 +115,7 @@ def measure(
         sigma = max(1.0, SMOOTHING * registration.scale)
         brightness = _smooth_within(corrected, inside, sigma)
         level, contrast = _threshold(brightness[inside], threshold)
-        if tissue is Tissue.AUTO:
+        if tissue is Appearance.AUTO:
             band = inside & ~registration.covers(mould.outline.buffer(-margin - RIM_BAND), size)
             tissue = _look(brightness > level, inside, band)
     outline = _outline(brightness, level, tissue, registration)
@@ -200,21 +200,21 @@ def _threshold(seen: NDArray[np.float64], given: float | None) -> tuple[float, f
     return level, contrast
 
 
-def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.bool_]) -> Tissue:
+def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.bool_]) -> Appearance:
     """Bright or dark: the floor is what lies along the rim more than elsewhere."""
     along, elsewhere = float(above[band].mean()), float(above[inside & ~band].mean())
     if abs(along - elsewhere) < 0.1 * max(along, elsewhere):
         raise RaptorError(
             "it cannot be seen which surface is the tissue; give --tissue bright or --tissue dark"
         )
-    return Tissue.DARK if along > elsewhere else Tissue.BRIGHT
+    return Appearance.DARK if along > elsewhere else Appearance.BRIGHT
 
 
 def _outline(
-    brightness: NDArray[np.float64], level: float, tissue: Tissue, registration: Registration
+    brightness: NDArray[np.float64], level: float, tissue: Appearance, registration: Registration
 ) -> shapely.Geometry:
     """What lies on the tissue's side of a level, as polygons in l0 between pixels."""
-    signed = (brightness - level) * (1 if tissue is Tissue.BRIGHT else -1)
+    signed = (brightness - level) * (1 if tissue is Appearance.BRIGHT else -1)
     signed = np.pad(signed, 1, constant_values=-float(np.abs(signed).max()))
     rings = [registration.to_mould(ring[:, ::-1] - 1) for ring in find_contours(signed, 0.0) if len(ring) > 3]
     shapes = [shape for ring in rings if (shape := shapely.Polygon(ring).buffer(0)).area > GRAIN]

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from raptor.condor import Simulation
+from raptor.condor.simulate import Tissue
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.fields.metrics import BULK
@@ -266,7 +266,7 @@ def tradeoff_figure(table: pd.DataFrame) -> Figure:
 
 @STYLED
 def folding_figure(
-    tissues: Mapping[str, Simulation], shares: Mapping[str, NDArray[np.float64]], mould: Mould
+    tissues: Mapping[str, Tissue], shares: Mapping[str, NDArray[np.float64]], mould: Mould
 ) -> Figure:
     """Tissues from above, cells coloured by the share (cells,) of their bonds that are reversed."""
     figure = new_figure(9.0, 3.2)

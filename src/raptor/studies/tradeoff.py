@@ -12,12 +12,12 @@ import pandas as pd
 import shapely
 from numpy.typing import NDArray
 
-from raptor.condor.simulate import Simulation, simulate
-from raptor.fields.raster import rasterise
+from raptor.condor.simulate import Tissue, simulate
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters, NetworkModel
+from raptor.raster import rasterise
 from raptor.surrogate.inference import Surrogate
 
 
@@ -85,12 +85,12 @@ class Case:
             content["seed"] % 2**31,
         )
 
-    def simulate(self, accuracy: str, seed: int | None = None) -> Simulation:
+    def simulate(self, accuracy: str, seed: int | None = None) -> Tissue:
         """One run at an accuracy, of the case's seed or another."""
         seed = self.seed if seed is None else seed
         return simulate(self.mould, self.parameters, self.model, accuracy, seed)
 
-    def fields(self, s: Simulation, pixels: int | None = None) -> NDArray[np.float64]:
+    def fields(self, s: Tissue, pixels: int | None = None) -> NDArray[np.float64]:
         """Its fields (8, y, x)."""
         return rasterise(s.positions, s.orientation, s.tension, pixels or self.pixels)
 
@@ -233,7 +233,7 @@ def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
     return work(), time.process_time() - started
 
 
-def _outcome(s: Simulation) -> dict[str, Any]:
+def _outcome(s: Tissue) -> dict[str, Any]:
     return {
         "energy": s.energy,
         "wall_energy": s.wall_energy + s.contact_energy,

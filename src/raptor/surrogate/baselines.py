@@ -13,8 +13,8 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.examples import Example, transform_sample
 from raptor.dataset.scaling import scale_inputs
 from raptor.dataset.stack import Sample, read_samples, read_table
-from raptor.fields.raster import rasterise
 from raptor.moulds.geometry import Mould
+from raptor.raster import rasterise
 from raptor.symmetry import Element
 
 COARSE = 16  # pixels of the images by which moulds are compared

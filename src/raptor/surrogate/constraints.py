@@ -12,8 +12,8 @@ from torch import Tensor, nn
 from torch.nn.functional import conv2d, softplus
 
 from raptor.dataset.scaling import Scaling
-from raptor.fields.raster import DEEP
 from raptor.frame import pixel_size
+from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
 SMALL = 1e-12

@@ -20,7 +20,7 @@ from raptor.condor.gpu.agitate import agitate
 from raptor.condor.gpu.energy import cell_tension, objective, reversed_bonds, units
 from raptor.condor.gpu.layout import BLOCK, Batch, Cast, build_batch
 from raptor.condor.gpu.minimise import Goal, Minimiser
-from raptor.condor.simulate import Accuracy, Simulation, accuracy_named, undrifted
+from raptor.condor.simulate import Accuracy, Tissue, accuracy_named, undrifted
 from raptor.condor.system import cast_state
 from raptor.core.errors import RaptorError
 from raptor.moulds.geometry import Mould
@@ -106,7 +106,7 @@ class BatchSolver:
         self.began = torch.empty(0)  # states in which tissues began their present steps
         self.evaluated = 0  # cells times evaluations
 
-    def run(self) -> Iterator[tuple[int, Simulation]]:
+    def run(self) -> Iterator[tuple[int, Tissue]]:
         """Contract all tasks; gives number and simulation of each as it finishes."""
         started = time.perf_counter()
         while self.queue or self.minimiser is not None:
@@ -238,7 +238,7 @@ class BatchSolver:
             self._begin(onward)
         return np.asarray(retired)
 
-    def _finish(self, retired: NDArray[np.bool_], seconds: float) -> Iterator[tuple[int, Simulation]]:
+    def _finish(self, retired: NDArray[np.bool_], seconds: float) -> Iterator[tuple[int, Tissue]]:
         """Simulations of the tissues that retire; `seconds` is what an evaluation of a cell takes."""
         part, progress = self._busy().take(self._mask(retired)), self.progress.take(retired)
         batch, goal = part.batch, part.goal
@@ -263,7 +263,7 @@ class BatchSolver:
             finite = bool(np.isfinite(blocks).all() and np.isfinite(energy))
             yield (
                 number,
-                Simulation(
+                Tissue(
                     sites=task.cast.sites,
                     positions=blocks[: 3 * n].reshape(3, -1).T.copy(),
                     orientation=blocks[3 * n :].reshape(3, -1).T.copy(),

@@ -1,4 +1,4 @@
-"""From cells to pixels on a GPU: the fields of `raptor.fields.raster` as products of matrices.
+"""From cells to pixels on a GPU: the fields of `raptor.raster` as products of matrices.
 
 The weight of a cell on a pixel is a product of one along x and one along y, so a field is
 (weights along y)^T diag(z) (weights along x): work that a GPU does at its full rate.
@@ -9,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from raptor.fields.raster import SIGMA, channels_of
 from raptor.frame import IMAGE_SIZE, pixel_size
+from raptor.raster import SIGMA, channels_of
 
 
 def _weights(position: Tensor, pixels: int) -> Tensor:
@@ -27,7 +27,7 @@ def rasterise(
     pixels: int,
     device: torch.device,
 ) -> NDArray[np.float32]:
-    """The eight fields (8, pixels, pixels), as `raptor.fields.raster.rasterise`, in single precision."""
+    """The eight fields (8, pixels, pixels), as `raptor.raster.rasterise`, in single precision."""
     channels = torch.tensor(channels_of(orientation, tension), dtype=torch.float32, device=device)
     x, y = (torch.tensor(positions[:, axis], dtype=torch.float32, device=device) for axis in (0, 1))
     along = channels[:, :, None] * _weights(x, pixels)[:, None]

@@ -15,7 +15,7 @@ from raptor.moulds.library import TISSUES
 from raptor.parameters import CellParameters
 
 
-class Tissue(Block):
+class MeasuredTissue(Block):
     """A tissue and the mould it grew in: measured, or known by its delta alone."""
 
     description: str = Field(description="cells, gel and source of the measurement")
@@ -51,7 +51,7 @@ class Tissue(Block):
         return self.parameters(self.description)
 
     @model_validator(mode="after")
-    def _measured(self) -> "Tissue":
+    def _measured(self) -> "MeasuredTissue":
         if not self.measured and "delta" not in self.paper:
             raise ValueError(
                 "neither area_ratio nor width_ratio is given; a fit needs one of them (or, for a tissue to "
@@ -65,7 +65,9 @@ class Tissue(Block):
         return self.area_ratio is not None or self.width_ratio is not None
 
 
-def load_tissues(path: str | Path | None = None, names: tuple[str, ...] | None = None) -> dict[str, Tissue]:
+def load_tissues(
+    path: str | Path | None = None, names: tuple[str, ...] | None = None
+) -> dict[str, MeasuredTissue]:
     """Read tissues, all or those named, of the library or of another file; their moulds are not.
 
     Raises
@@ -78,7 +80,7 @@ def load_tissues(path: str | Path | None = None, names: tuple[str, ...] | None =
     return {name: _tissue(content, name, path) for name in (content if names is None else names)}
 
 
-def require_measured(tissues: Mapping[str, Tissue], unmeasured: Mapping[str, Tissue]) -> None:
+def require_measured(tissues: Mapping[str, MeasuredTissue], unmeasured: Mapping[str, MeasuredTissue]) -> None:
     """Find out before any work that tissues to fit were measured, and that the others have a delta.
 
     Raises
@@ -97,7 +99,7 @@ def require_measured(tissues: Mapping[str, Tissue], unmeasured: Mapping[str, Tis
             raise RaptorError(f"tissue {name} has no paper: {{delta: ...}} to be simulated at; give it one")
 
 
-def tissue(name: str, path: str | Path | None = None) -> Tissue:
+def tissue(name: str, path: str | Path | None = None) -> MeasuredTissue:
     """A measured tissue by name, of the library or of another file.
 
     Raises
@@ -108,15 +110,15 @@ def tissue(name: str, path: str | Path | None = None) -> Tissue:
     return load_tissues(path, (name,))[name]
 
 
-def _tissue(content: dict[str, Any], name: str, path: Path) -> Tissue:
+def _tissue(content: dict[str, Any], name: str, path: Path) -> MeasuredTissue:
     """A tissue of a file's content."""
     if name not in content:
         near = get_close_matches(name, content, 1)
         hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(content)}"
         raise RaptorError(f"{path} has no tissue '{name}'{hint}")
     try:
-        found = Tissue.model_validate(content[name])
+        found = MeasuredTissue.model_validate(content[name])
     except ValidationError as error:
-        raise RaptorError("; ".join(explain(error, f"{path}, {name}", Tissue))) from None
+        raise RaptorError("; ".join(explain(error, f"{path}, {name}", MeasuredTissue))) from None
     beside = path.parent / found.mould
     return found.model_copy(update={"mould": str(beside)}) if beside.is_file() else found

@@ -3,12 +3,19 @@
 Element = mirror x -> -x first where `mirror`, then counter-clockwise quarter turns.
 """
 
+import sys
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # what needs no tensors does not wait for torch
+    from torch import Tensor
+
+Image = TypeVar("Image", NDArray[Any], "Tensor")
 
 FIELDS = ("density", "tension", "sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz")
 """The eight output channels, in order."""
@@ -83,25 +90,34 @@ class Element:
         return matrix
 
     @cached_property
-    def permutation(self) -> tuple[list[int], list[float]]:
+    def permutation(self) -> list[tuple[int, float]]:
         """`channel_matrix` as the channel that each image is made from, and its sign."""
         source = np.abs(self.channel_matrix).argmax(axis=1)
-        return source.tolist(), self.channel_matrix[np.arange(8), source].tolist()
+        return list(zip(source.tolist(), self.channel_matrix[np.arange(8), source].tolist(), strict=True))
 
 
-def move_pixels(image: NDArray[Any], element: Element) -> NDArray[Any]:
-    """Move the pixels of a square image (..., y, x), rows ascending in y; values unchanged."""
-    if element.mirror:
-        image = image[..., ::-1]
-    # np.rot90 turns rows that descend in y counter-clockwise; ours ascend, hence the sign.
-    return np.rot90(image, -element.quarter_turns, axes=(-2, -1))
+def move_pixels(image: Image, element: Element) -> Image:
+    """Move the pixels of a square image (..., y, x), rows ascending in y; values unchanged.
+
+    numpy arrays and torch tensors alike.
+    """
+    arrays = _library(image)
+    moved = arrays.flip(image, (-1,)) if element.mirror else image
+    # rot90 turns rows that descend in y counter-clockwise; ours ascend, hence the sign.
+    return arrays.rot90(moved, -element.quarter_turns, (-2, -1))  # type: ignore[no-any-return]
 
 
-def apply(fields: NDArray[np.floating], element: Element) -> NDArray[np.floating]:
-    """Transform a field stack (..., 8, y, x) in the order `FIELDS` as tensors.
+def apply(fields: Image, element: Element) -> Image:
+    """Transform a field stack (..., 8, y, x) in the order `FIELDS` as tensors of order 0, 1 and 2.
 
-    Scaled stacks transform alike, since the scaling commutes with D4 (dataset.scaling).
+    numpy arrays and torch tensors alike. Scaled stacks transform alike, since the scaling commutes with
+    D4 (dataset.scaling).
     """
     moved = move_pixels(fields, element)
-    source, sign = element.permutation
-    return np.ascontiguousarray(moved[..., source, :, :] * np.array(sign, fields.dtype)[:, None, None])
+    images = [sign * moved[..., channel, :, :] for channel, sign in element.permutation]
+    return _library(fields).stack(images, -3)  # type: ignore[no-any-return]
+
+
+def _library(array: Any) -> ModuleType:
+    """The library that an array is of, numpy or torch: they name what is used here alike."""
+    return sys.modules[type(array).__module__.partition(".")[0]]

@@ -11,10 +11,9 @@ from raptor.moulds import Circle, Mould, mould_image
 from raptor.parameters import CellParameters
 from raptor.raster import rasterise
 from raptor.surrogate import constraints
-from raptor.surrogate.batches import apply
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.networks import Architecture, Generator, initialise
-from raptor.symmetry import Element
+from raptor.symmetry import Element, apply
 
 PIXELS, CELLS = 64, 300
 SCALING = Scaling((0.2, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0), (0.2, 1.5, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1))

@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+import torch
 
 from raptor.raster import rasterise
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
@@ -59,3 +60,14 @@ def test_pixels_move_without_values():
         moved = move_pixels(image, element)
         assert sorted(moved.ravel()) == list(range(16))
         assert np.array_equal(move_pixels(moved, element.inverse), image)
+
+
+def test_tensors_of_torch_move_as_arrays_of_numpy_do():
+    rng = np.random.default_rng(2)
+    for fields in (rng.normal(size=(2, 3, 8, 5, 5)), rng.normal(size=(8, 4, 6)).astype(np.float32)):
+        for element in ELEMENTS:
+            tensor = apply(torch.from_numpy(fields), element)
+            assert np.array_equal(tensor.numpy(), apply(fields, element))
+            assert tensor.numpy().dtype == apply(fields, element).dtype == fields.dtype
+            moved = move_pixels(torch.from_numpy(fields), element)
+            assert np.array_equal(moved.numpy(), move_pixels(fields, element))

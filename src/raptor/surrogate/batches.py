@@ -8,23 +8,10 @@ from torch.utils.data import DataLoader
 
 from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import INPUTS
-from raptor.symmetry import FIELDS, Element
+from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 ROOM = 3 * 2**30  # bytes of the processor's memory that samples may take
 Batches = Iterable[tuple[Tensor, Tensor]]
-
-
-def move_pixels(images: Tensor, element: Element) -> Tensor:
-    """`raptor.symmetry.move_pixels` for tensors (..., y, x)."""
-    moved = images.flip(-1) if element.mirror else images
-    return torch.rot90(moved, -element.quarter_turns, dims=(-2, -1))
-
-
-def apply(fields: Tensor, element: Element) -> Tensor:
-    """`raptor.symmetry.apply` for tensors (..., 8, y, x)."""
-    source, sign = element.permutation
-    signs = torch.tensor(sign, dtype=fields.dtype, device=fields.device)
-    return move_pixels(fields, element)[..., source, :, :] * signs[:, None, None]
 
 
 def samples_of(dataset: ExampleSet) -> list[int]:

@@ -20,11 +20,10 @@ from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import MouldImage, mould_image
 from raptor.parameters import CellParameters
 from raptor.surrogate.bands import Bands, Calibration
-from raptor.surrogate.batches import apply, move_pixels
 from raptor.surrogate.constraints import average, project, signed, unsigned
 from raptor.surrogate.networks import Architecture, Generator
 from raptor.surrogate.out_of_distribution import descriptors
-from raptor.symmetry import FIELDS, Element
+from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 BATCH = 16
 

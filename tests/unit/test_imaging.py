@@ -23,9 +23,9 @@ from raptor.imaging import (
     register,
 )
 from raptor.imaging.illumination import fit_light
-from raptor.imaging.overlay import overlay_figure, write_overlay
 from raptor.imaging.tissue import without_specks
 from raptor.moulds import Circle, Mould, mould_image, read_mould
+from raptor.plotting.overlay import overlay_figure, write_overlay
 from tests.photograph import CASES, Camera, contracted, coverage, photograph
 
 MOULD = read_mould("four_post_rectangle")

@@ -53,7 +53,7 @@ def measure(
     registration = imaging.register(picture, shape, landmarks or (), aligned, mirrored)
     measured = imaging.measure(picture, shape, registration, appearance, threshold)
     if overlay is not None:
-        from raptor.imaging.overlay import write_overlay
+        from raptor.plotting.overlay import write_overlay
 
         write_overlay(overlay, picture, shape, measured)
     if outline is not None:

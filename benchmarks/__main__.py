@@ -96,7 +96,7 @@ def _print_levels(mould: Mould, model: NetworkModel, seeds: int) -> None:
                     f"{sum(t.converged for t in tissues)} of {seeds}",
                 )
             )
-    heads = ("case", "accuracy", "median E", "E", "folded, most", "median s", "converged")
+    heads = ("case", "accuracy", "median E", "E", "inverted, most", "median s", "converged")
     _print(f"Whole runs, {seeds} seeds", heads, rows)
 
 

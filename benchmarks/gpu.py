@@ -62,7 +62,7 @@ class Agreement:
     density_error: float
     density_error_of_seeds: float
     converged: int
-    folded: int
+    inverted: int
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def agreement(
         density_error=float(np.median(errors)),
         density_error_of_seeds=float(np.median(floor)),
         converged=sum(tissue.converged for tissue in together.values()),
-        folded=sum(tissue.inverted_fraction > 0 for tissue in together.values()),
+        inverted=sum(tissue.inverted_fraction > 0 for tissue in together.values()),
     )
 
 
@@ -202,7 +202,7 @@ def _rows(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "the same between two seeds", f"{100 * a['energy_of_seeds']:.2f} %"
     yield "density VRMSE against a single run", f"{a['density_error']:.3f}"
     yield "the same between two seeds", f"{a['density_error_of_seeds']:.3f}"
-    yield "converged; folded", f"{a['converged']} of {a['moulds']}; {a['folded']}"
+    yield "converged; inverted", f"{a['converged']} of {a['moulds']}; {a['inverted']}"
     yield f"{t['simulations']} of {t['of']} simulations, contracted", f"{t['seconds']:.1f} s"
     whole = t["seconds"] * t["of"] / t["simulations"]
     yield "all of them" + ("" if t["simulations"] == t["of"] else ", extrapolated"), f"{whole / 60:.1f} min"

@@ -52,7 +52,9 @@ def contraction_step(
     path = steps_to(parameters.delta, 0.1)
     middle = len(path) // 2
     for delta in path[:middle]:
-        state = minimise(state, system.network, system.walls, delta, tolerance=1e-2, limit=200).state
+        state = minimise(
+            state, system.network, system.walls, delta, tolerance=1e-2, max_evaluations=200
+        ).state
     return system, state, float(path[middle])
 
 
@@ -61,10 +63,12 @@ def against_scipy(
 ) -> Iterator[Minimised]:
     """Our minimiser and SciPy's L-BFGS-B on the same gradient, from the same state."""
     system, state, delta = contraction_step(mould, parameters, model)
-    minimise(state, system.network, system.walls, delta, tolerance=0.0, limit=2)
+    minimise(state, system.network, system.walls, delta, tolerance=0.0, max_evaluations=2)
     started = time.perf_counter()
-    found = minimise(state, system.network, system.walls, delta, tolerance=0.0, limit=evaluations)
-    yield Minimised("ours", found.energy + found.walled, found.evaluations, time.perf_counter() - started)
+    found = minimise(state, system.network, system.walls, delta, tolerance=0.0, max_evaluations=evaluations)
+    yield Minimised(
+        "ours", found.energy + found.wall_energy, found.evaluations, time.perf_counter() - started
+    )
     evaluate = _scaled_objective(system, delta)
     start = _scaled(state, orientation_lever(delta))
     started = time.perf_counter()
@@ -86,8 +90,10 @@ def _scaled_objective(system: System, delta: float) -> Callable[[Array], tuple[f
 
     def evaluate(state: Array) -> tuple[float, Array]:
         gradient = np.empty_like(state)
-        energy, walled = _objective_kernel(state, gradient, system.network, system.walls, delta, 0.0, work)
-        return energy + walled, gradient
+        energy, wall_energy = _objective_kernel(
+            state, gradient, system.network, system.walls, delta, 0.0, work
+        )
+        return energy + wall_energy, gradient
 
     return evaluate
 

@@ -23,8 +23,8 @@ def walls(small_mould, lattice):
 @pytest.mark.parametrize("contact", [0.0, 100.0])
 def test_gradient_is_that_of_the_energy_walls_included(network, walls, random_state, contact):
     step = 1e-5
-    _, walled, gradient = objective(random_state, network, walls, 0.6, contact)
-    assert walled > 0.1  # the state does press on walls
+    _, wall_energy, gradient = objective(random_state, network, walls, 0.6, contact)
+    assert wall_energy > 0.1  # the state does press on walls
     numeric = np.empty_like(gradient)
     for i in range(len(random_state)):
         ends = []
@@ -87,9 +87,9 @@ def test_opposite_orientations_are_the_same_cell(lattice, network, walls, random
 
 def test_without_contraction_the_cast_lattice_is_at_rest(lattice, network, walls):
     state = np.concatenate([lattice.sites.T.ravel(), np.ones(3 * lattice.cells)])
-    energy, walled, gradient = objective(state, network, walls, 0.0)
+    energy, wall_energy, gradient = objective(state, network, walls, 0.0)
     assert energy < 1e-9
-    assert walled == 0
+    assert wall_energy == 0
     assert np.abs(gradient).max() < 1e-6
     assert cell_tension(state, lattice, 0.0) == pytest.approx(0, abs=1e-6)
 

@@ -12,7 +12,8 @@ from raptor.condor.energy import objective as objective_of_one
 from raptor.condor.gpu import agitate as agitation
 from raptor.condor.gpu.agitate import agitate, uniform
 from raptor.condor.gpu.contract import BatchSolver, Task
-from raptor.condor.gpu.energy import cell_tension, objective, reversed_bonds, units
+from raptor.condor.gpu.energy import cell_tension, objective, units
+from raptor.condor.gpu.energy import inverted_fraction as inverted_in_batch
 from raptor.condor.gpu.layout import BLOCK, ROW, build_batch, cast, join
 from raptor.condor.gpu.raster import rasterise as rasterise_on
 from raptor.condor.simulate import simulate
@@ -93,18 +94,20 @@ def test_energy_gradient_tension_and_folds_are_those_of_one_tissue(shells):
     delta = torch.tensor([t.parameters.delta for t in chosen], dtype=torch.float64)
     contact = torch.full_like(delta, 50.0)
     found = objective(batch, state, delta, contact)
-    folded = reversed_bonds(batch, state)
+    inverted = inverted_in_batch(batch, state)
     for number, (task, part) in enumerate(zip(chosen, parts, strict=True)):
         system = build_system(task.mould, task.parameters, model)
-        energy, walled, gradient = objective_of_one(
+        energy, wall_energy, gradient = objective_of_one(
             part, system.network, system.walls, task.parameters.delta, 50.0
         )
         assert float(found.energy[number]) == pytest.approx(energy, rel=1e-5)
-        assert float(found.wall[number] + found.touching[number]) == pytest.approx(walled, rel=1e-4, abs=1e-4)
+        assert float(found.wall[number] + found.touching[number]) == pytest.approx(
+            wall_energy, rel=1e-4, abs=1e-4
+        )
         cells = system.lattice.cells
         ours = of_tissue(batch, found.gradient, number, cells).ravel()
         assert np.abs(ours - gradient).max() < 1e-4 * np.abs(gradient).max()
-        assert float(folded[number]) == pytest.approx(inverted_fraction(part, system.lattice))
+        assert float(inverted[number]) == pytest.approx(inverted_fraction(part, system.lattice))
         for kind in ("hooke", "literal"):
             wanted = tension_of_one(part, system.lattice, task.parameters.delta, kind)
             ours = of_tissue(batch, cell_tension(batch, state, delta, kind), number, cells)

@@ -97,10 +97,10 @@ def test_what_is_said_to_be_left_of_the_gradient_is_left():
         system = build_system(POSTED, dense, NetworkModel(3))
         state = np.concatenate([tissue.positions.T.ravel(), tissue.orientation.T.ravel()])
         contact = CONTACT if tissue.contact_energy > 0 else 0.0
-        _, walled, gradient = objective(state, system.network, system.walls, dense.delta, contact)
+        _, wall_energy, gradient = objective(state, system.network, system.walls, dense.delta, contact)
         gradient[gradient.size // 2 :] /= dense.delta
         assert np.abs(gradient).max() == pytest.approx(tissue.gradient, rel=1e-3)
-        assert walled == pytest.approx(tissue.wall_energy + tissue.contact_energy, rel=1e-6, abs=1e-9)
+        assert wall_energy == pytest.approx(tissue.wall_energy + tissue.contact_energy, rel=1e-6, abs=1e-9)
         assert tissue.gradient <= ACCURACIES["standard"].contraction.tolerance * dense.delta
         held += tissue.contact_energy
     assert held > 0  # this corner does need them
@@ -111,7 +111,7 @@ def test_agitation_moves_cells_from_its_first_sweeps(delta):
     """Proposals start at about the thermal amplitude, not so large that all are refused."""
     system = build_system(POSTED, MIDDLE, NetworkModel(2))
     state = cast_state(system.lattice.sites, np.random.default_rng(0))
-    state = minimise(state, system.network, system.walls, delta, tolerance=1e-2, limit=500).state
+    state = minimise(state, system.network, system.walls, delta, tolerance=1e-2, max_evaluations=500).state
     for sweeps in (5, 50):
         found = anneal(
             state, system.order, system.sublattices, system.walls, delta, np.random.default_rng(1),
@@ -180,8 +180,8 @@ def test_rounds_never_end_higher():
     contraction = ACCURACIES["standard"].contraction
     state = cast_state(system.lattice.sites, rng)
     before = contract(state, system, MIDDLE.delta, contraction, rng)
-    after = refine(before, system, MIDDLE.delta, contraction, rng, rounds=3, sweeps=50)
-    assert after.energy + after.walled <= before.energy + before.walled
+    after = refine(before, system, MIDDLE.delta, contraction, rng, hops=3, sweeps=50)
+    assert after.energy + after.wall_energy <= before.energy + before.wall_energy
     assert after.evaluations > before.evaluations
 
 
@@ -252,8 +252,8 @@ def test_minimisation_never_raises_the_objective():
     state = cast_state(lattice.sites, np.random.default_rng(0))
     before = np.inf
     for limit in (5, 20, 80, 320, 1280):
-        found = minimise(state, network, walls, 0.9, tolerance=0.0, limit=limit)
-        total = found.energy + found.walled
+        found = minimise(state, network, walls, 0.9, tolerance=0.0, max_evaluations=limit)
+        total = found.energy + found.wall_energy
         assert total <= before
         assert sum(objective(found.state, network, walls, 0.9)[:2]) == pytest.approx(total)
         assert not found.converged

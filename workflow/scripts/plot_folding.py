@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from raptor.condor.energy import reversed_share
+from raptor.condor.energy import inverted_share
 from raptor.condor.lattice import build_lattice
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
@@ -21,7 +21,7 @@ with logged(snakemake.log[0]):
         for method in methods:
             tissues[method] = case.simulate(method)
             advance(method)
-    shares = {name: reversed_share(s.positions, lattice) for name, s in tissues.items()}
+    shares = {name: inverted_share(s.positions, lattice) for name, s in tissues.items()}
     save(folding_figure(tissues, shares, case.mould), Path(snakemake.output.png).with_suffix(""))
     parts = [
         pd.DataFrame(s.positions, columns=["x", "y", "z"]).assign(method=name, reversed=shares[name])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from raptor.condor.energy import SMALLEST_LEVER, SOFTENING, unit_orientations
 from raptor.condor.network import Network
 from raptor.condor.simd import lanes, load, positive, sqrt, store, where
-from raptor.condor.walls import Walls, wall_energy
+from raptor.condor.walls import Walls, wall_energy_kernel
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 
@@ -130,8 +130,8 @@ def _accept_kernel(state, n, first, filled, walls, temperature, work):
     for lane in range(filled):
         i = first + lane
         added = float(trial[6, lane])
-        added += wall_energy(trial[0, lane], trial[1, lane], trial[2, lane], walls)[0]
-        added -= wall_energy(state[i], state[i + n], state[i + 2 * n], walls)[0]
+        added += wall_energy_kernel(trial[0, lane], trial[1, lane], trial[2, lane], walls)[0]
+        added -= wall_energy_kernel(state[i], state[i + n], state[i + 2 * n], walls)[0]
         if added <= 0.0 or work.random[drawn + lane] < math.exp(-added / temperature):
             accepted += 1
             for row in range(6):

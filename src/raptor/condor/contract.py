@@ -4,7 +4,7 @@
 a few sweeps of Metropolis agitate the cells, so that they leave the shallowest valleys, and then
 positions and orientations are minimised together. A bond across two cells rests at L (1 - Delta);
 the solver chooses the steps so that each shortens it by the same part of its length: large ones
-while the gel is loose, small ones where it is dense and folds easily. A step that reversed a
+while the gel is loose, small ones where it is dense and folds easily. A step that inverted a
 bond is minimised on with contacts, which push it back; if that fails, the step is taken again with
 contacts and without agitation. Starting hot, or at the full Delta, can fold the network
 through itself; following the contraction does not.
@@ -25,7 +25,7 @@ from raptor.condor.system import System
 
 TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: orientations shake
 FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
-WARMTH_OF_ROUNDS = 2.0  # times the temperature of agitation
+HOP_WARMTH = 2.0  # times the temperature of agitation
 COOLING = 10.0  # from the first to the last temperature of an agitation
 FEWEST_STEPS = 3  # so that orientations are agitated more than once
 CONTACT = 100.0  # kappa0, as the walls
@@ -42,20 +42,20 @@ class Contraction:
         contraction in one step (`relax`).
     sweeps : int
         Metropolis sweeps of each step before it is minimised.
-    settled : float
-        A step is left when 25 more evaluations lower the energy by no more than this part; the
-        last one must meet the tolerance too. Less than zero: the tolerance alone counts.
+    ftol : float
+        A step ends when 25 more evaluations lower the energy by no more than this part; the last
+        must meet the tolerance too. Less than zero: the tolerance alone counts.
     tolerance : float
         Largest component of the gradient at the end, in kappa0 l0 times Delta.
-    limit : int
+    max_evaluations : int
         Evaluations of the last minimisation at most.
     """
 
     shortening: float
     sweeps: int
-    settled: float
+    ftol: float
     tolerance: float
-    limit: int
+    max_evaluations: int
 
 
 def agitation_temperature(delta: float) -> float:
@@ -99,17 +99,17 @@ def _step(
     rng: Generator,
     last: bool,
 ) -> Minimum:
-    """One step to `delta`: agitated, minimised and, but for the one-step draft, unfolded."""
+    """One step to `delta`: agitated, minimised and, but for the one-step draft, freed of inverted bonds."""
     trial = state
     if contraction.sweeps:
         trial = agitate(state, system, delta, contraction.sweeps, rng)
     minimum = _minimise(trial, system, delta, contraction, last)
     if contraction.shortening < 1:
-        minimum = _unfolded(minimum, state, system, delta, contraction, last)
+        minimum = _without_inversion(minimum, state, system, delta, contraction, last)
     return minimum
 
 
-def _unfolded(
+def _without_inversion(
     minimum: Minimum,
     start: NDArray[Any],
     system: System,
@@ -117,7 +117,7 @@ def _unfolded(
     contraction: Contraction,
     last: bool,
 ) -> Minimum:
-    """A minimum without reversed bonds: with contacts from there, or else from the start."""
+    """A minimum without inverted bonds: with contacts from there, or else from the start."""
     used = minimum.evaluations
     for state in (minimum.state, start):
         if inverted_fraction(minimum.state, system.lattice) == 0:
@@ -141,10 +141,10 @@ def _minimise(
         system.walls,
         delta,
         tolerance=contraction.tolerance,
-        settled=contraction.settled,
-        thorough=last and contraction.settled >= 0,
+        ftol=contraction.ftol,
+        thorough=last and contraction.ftol >= 0,
         contact=contact,
-        limit=contraction.limit,
+        max_evaluations=contraction.max_evaluations,
     )
 
 
@@ -174,23 +174,23 @@ def refine(
     contraction: Contraction,
     rng: Generator,
     *,
-    rounds: int,
+    hops: int,
     sweeps: int,
 ) -> Minimum:
-    """Agitate and minimise again and again, keeping what ends lower, converged and unfolded.
+    """Agitate and minimise again and again, keeping what ends lower, converged and no more inverted.
 
     Basin hopping (D. Wales and J. Doye, J. Phys. Chem. A 101, 5111, 1997, doi:10.1021/jp970984n):
     removes boundaries between domains of orientation.
     """
     used = minimum.evaluations
-    for _ in range(rounds):
-        agitated = agitate(minimum.state, system, delta, sweeps, rng, WARMTH_OF_ROUNDS)
+    for _ in range(hops):
+        agitated = agitate(minimum.state, system, delta, sweeps, rng, HOP_WARMTH)
         found = _minimise(agitated, system, delta, contraction, last=True)
-        found = _unfolded(found, minimum.state, system, delta, contraction, last=True)
+        found = _without_inversion(found, minimum.state, system, delta, contraction, last=True)
         used += found.evaluations
-        lower = found.energy + found.walled < minimum.energy + minimum.walled
-        folded = inverted_fraction(found.state, system.lattice)
-        unfolded = folded <= inverted_fraction(minimum.state, system.lattice)
-        if lower and unfolded and found.converged >= minimum.converged:
+        lower = found.energy + found.wall_energy < minimum.energy + minimum.wall_energy
+        inverted = inverted_fraction(found.state, system.lattice)
+        no_more = inverted <= inverted_fraction(minimum.state, system.lattice)
+        if lower and no_more and found.converged >= minimum.converged:
             minimum = found
     return minimum._replace(evaluations=used)

@@ -22,7 +22,7 @@ from numpy.typing import DTypeLike, NDArray
 from raptor.condor.lattice import Lattice
 from raptor.condor.network import Network
 from raptor.condor.simd import lanes, load, positive, sqrt, store, total, where
-from raptor.condor.walls import Walls, near_kernel, wall_energy
+from raptor.condor.walls import Walls, near_kernel, wall_energy_kernel
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 
@@ -128,7 +128,7 @@ def _walls_kernel(state, gradient, walls):
     for i in range(n):
         x, y, z = state[i], state[n + i], state[2 * n + i]
         if near_kernel(x, y, z, walls):
-            wall, along_x, along_y, along_z = wall_energy(x, y, z, walls)
+            wall, along_x, along_y, along_z = wall_energy_kernel(x, y, z, walls)
             energy += wall
             gradient[i] += along_x
             gradient[n + i] += along_y
@@ -209,10 +209,10 @@ def objective(
     if (np.linalg.norm(state[3 * cells :].reshape(3, -1), axis=0) == 0).any():
         raise RaptorError("a cell's orientation has length zero; give each a direction")
     gradient = np.empty_like(state)
-    energy, walled = _objective_kernel(
+    energy, wall_energy = _objective_kernel(
         state, gradient, network, walls, delta, contact, scratch(cells, state.dtype)
     )
-    return float(energy), float(walled), gradient
+    return float(energy), float(wall_energy), gradient
 
 
 def cell_tension(
@@ -243,7 +243,7 @@ def coordination(lattice: Lattice) -> NDArray[np.int64]:
 
 
 @kernel
-def _reversed_kernel(positions, sites, first, second):
+def _inverted_kernel(positions, sites, first, second):
     """Number of bonds that point against their direction at casting."""
     cells = sites.shape[0]
     count = 0
@@ -259,11 +259,11 @@ def _reversed_kernel(positions, sites, first, second):
 
 def inverted_fraction(state: NDArray[Any], lattice: Lattice) -> float:
     """Share of bonds whose direction has reversed since casting; 0 without bonds."""
-    count = _reversed_kernel(state, lattice.sites, lattice.first, lattice.second)
+    count = _inverted_kernel(state, lattice.sites, lattice.first, lattice.second)
     return float(count) / max(1, lattice.bonds)
 
 
-def reversed_share(positions: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
+def inverted_share(positions: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
     """Share of each cell's bonds that point against their direction at casting, (cells,).
 
     `positions` are (cells, 3), l0.

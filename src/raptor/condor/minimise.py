@@ -31,16 +31,16 @@ BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the i
 class Minimum(NamedTuple):
     """A minimised state and how it was reached.
 
-    `state` as in `energy`, `energy` of the bonds and `walled` of walls and contacts (kappa0 l0^2),
-    `gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
+    `state` as in `energy`, `energy` of the bonds and `wall_energy` of walls and contacts (kappa0 l0^2),
+    `residual_gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
     `evaluations` of the objective, whether the gradient fell below the tolerance, and the stiffness
-    of the contacts that were held (kappa0).
+    of the contacts that acted (kappa0).
     """
 
     state: NDArray[Any]
     energy: float
-    walled: float
-    gradient: float
+    wall_energy: float
+    residual_gradient: float
     evaluations: int
     converged: bool
     contact: float = 0.0
@@ -85,16 +85,16 @@ def _largest(a):
 
 
 @kernel
-def _left_kernel(state, gradient, lever):
+def _residual_gradient_kernel(state, gradient, lever):
     """Largest component of the gradient, that by orientations as for vectors of the lever's length."""
     n = state.size // 6
-    left = float(_largest(gradient[: 3 * n]))
+    residual = float(_largest(gradient[: 3 * n]))
     for i in range(3 * n, 4 * n):
         a, b, c = state[i], state[i + n], state[i + 2 * n]
         length = math.sqrt(a * a + b * b + c * c)
         turn = max(abs(gradient[i]), abs(gradient[i + n]), abs(gradient[i + 2 * n]))
-        left = max(left, turn * length / lever)
-    return left
+        residual = max(residual, turn * length / lever)
+    return residual
 
 
 @kernel
@@ -205,11 +205,11 @@ def _direction_kernel(work):
 def _search_kernel(state, total, slope, length, network, walls, delta, contact, work):
     """Shorten a step until the objective falls enough; returns the step and the new energies."""
     used = 0
-    energy = walled = 0.0
+    energy = wall_energy = 0.0
     for _ in range(BACKTRACKS):
         for i in range(state.size):
             work.trial[i] = state[i] + length * work.direction[i]
-        energy, walled = _objective_kernel(
+        energy, wall_energy = _objective_kernel(
             work.trial,
             work.trial_gradient,
             network,
@@ -219,27 +219,31 @@ def _search_kernel(state, total, slope, length, network, walls, delta, contact, 
             work.scratch,
         )
         used += 1
-        value = energy + walled
+        value = energy + wall_energy
         if value <= total + SUFFICIENT * length * slope:
-            return length, energy, walled, used
+            return length, energy, wall_energy, used
         # The minimum of the parabola through what is known, within bounds.
         best = -0.5 * slope * length * length / (value - total - slope * length)
         length = max(0.1 * length, min(0.5 * length, best))
-    return 0.0, energy, walled, used
+    return 0.0, energy, wall_energy, used
 
 
 @kernel
-def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, settled, thorough, limit, work):
+def _minimise_kernel(
+    state, network, walls, delta, contact, lever, tolerance, ftol, thorough, max_evaluations, work
+):
     """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
-    energy, walled = _objective_kernel(state, work.gradient, network, walls, delta, contact, work.scratch)
+    energy, wall_energy = _objective_kernel(
+        state, work.gradient, network, walls, delta, contact, work.scratch
+    )
     used = 1
     work.held[0] = 0
-    looked, energy_then, calm = used, energy + walled, False
-    while used < limit:
+    looked, energy_then, calm = used, energy + wall_energy, False
+    while used < max_evaluations:
         if used - looked >= WINDOW:
-            calm = energy_then - energy - walled <= settled * (energy + walled)
-            looked, energy_then = used, energy + walled
-        small = _left_kernel(state, work.gradient, lever) <= tolerance
+            calm = energy_then - energy - wall_energy <= ftol * (energy + wall_energy)
+            looked, energy_then = used, energy + wall_energy
+        small = _residual_gradient_kernel(state, work.gradient, lever) <= tolerance
         if (small and calm) if thorough else (small or calm):
             break
         slope = _direction_kernel(work)
@@ -249,8 +253,8 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
         length = min(1.0, _longest_step(work.direction, lever))
         if work.held[0] == 0:
             length = min(length, 0.1 * _longest_step(work.direction, lever))
-        length, new_energy, new_walled, trials = _search_kernel(
-            state, energy + walled, slope, length, network, walls, delta, contact, work
+        length, new_energy, new_wall_energy, trials = _search_kernel(
+            state, energy + wall_energy, slope, length, network, walls, delta, contact, work
         )
         used += trials
         if length == 0.0:
@@ -259,8 +263,8 @@ def _minimise_kernel(state, network, walls, delta, contact, lever, tolerance, se
             work.held[0] = 0
             continue
         _keep_kernel(state, work)
-        energy, walled = new_energy, new_walled
-    return energy, walled, _left_kernel(state, work.gradient, lever), used
+        energy, wall_energy = new_energy, new_wall_energy
+    return energy, wall_energy, _residual_gradient_kernel(state, work.gradient, lever), used
 
 
 def _workplace(state: NDArray[Any]) -> _Work:
@@ -298,10 +302,10 @@ def minimise(
     delta: float,
     *,
     tolerance: float,
-    settled: float = -1.0,
+    ftol: float = -1.0,
     thorough: bool = False,
     contact: float = 0.0,
-    limit: int,
+    max_evaluations: int,
 ) -> Minimum:
     """Minimise the energy of bonds and walls from a state (6 * cells,).
 
@@ -310,14 +314,14 @@ def minimise(
     tolerance : float
         Largest component of the gradient at which the state has converged, in units of
         kappa0 l0 times `orientation_lever(delta)`.
-    settled : float
+    ftol : float
         The state is left, though not converged, when `WINDOW` evaluations lower the energy by no
         more than this part.
     thorough : bool
         Leave it only when both are met, or no step lowers the energy any more.
     contact : float
         Stiffness of contacts (kappa0), as in `objective`.
-    limit : int
+    max_evaluations : int
         Evaluations of the objective, after which no further step is taken.
 
     Raises
@@ -331,9 +335,9 @@ def minimise(
     lever = orientation_lever(delta)
     state[state.size // 2 :] *= lever
     work = _workplace(state)
-    energy, walled, gradient, used = _minimise_kernel(
-        state, network, walls, delta, contact, lever, tolerance * lever, settled, thorough, limit, work
+    energy, wall_energy, residual, used = _minimise_kernel(
+        state, network, walls, delta, contact, lever, tolerance * lever, ftol, thorough, max_evaluations, work
     )
-    finite = math.isfinite(energy + walled) and bool(np.isfinite(state).all())
-    converged = finite and gradient <= tolerance * lever
-    return Minimum(unit_orientations(state), energy, walled, gradient, used, converged, contact)
+    finite = math.isfinite(energy + wall_energy) and bool(np.isfinite(state).all())
+    converged = finite and residual <= tolerance * lever
+    return Minimum(unit_orientations(state), energy, wall_energy, residual, used, converged, contact)

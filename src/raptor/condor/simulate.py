@@ -29,8 +29,8 @@ class Accuracy:
         Name written to files.
     contraction : Contraction
         How closely the contraction is followed, and its tolerance.
-    rounds, round_sweeps : int
-        Rounds of agitation and minimisation after the contraction, and the sweeps of each.
+    hops, hop_sweeps : int
+        Hops (agitation and minimisation) after the contraction, and the sweeps of each.
     anneal_sweeps : int
         Sweeps of the paper's anneal from the cast lattice, in place of the contraction.
     minimised : bool
@@ -41,23 +41,23 @@ class Accuracy:
 
     solver: str
     contraction: Contraction
-    rounds: int = 0
-    round_sweeps: int = 0
+    hops: int = 0
+    hop_sweeps: int = 0
     anneal_sweeps: int = 0
     minimised: bool = True
     precision: str = "float64"
 
     @property
     def contracts_alone(self) -> bool:
-        """Whether it neither anneals nor goes on in rounds: what batches of tissues can do."""
-        return not (self.anneal_sweeps or self.rounds)
+        """Whether it neither anneals nor hops: what batches of tissues can do."""
+        return not (self.anneal_sweeps or self.hops)
 
 
 ACCURACIES: dict[str, Accuracy] = {
-    # Largest gradient left, over Delta: 0.03, 0.02, 0.001 kappa0 l0.
+    # Residual gradient over Delta: 0.03, 0.02, 0.001 kappa0 l0.
     "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, 3e-2, 1500)),
     "standard": Accuracy("contract", Contraction(0.3, 50, 5e-3, 2e-2, 10000)),
-    "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), rounds=5, round_sweeps=300),
+    "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), hops=5, hop_sweeps=300),
 }
 """What `accuracy: draft | standard | reference` means."""
 
@@ -105,7 +105,7 @@ class Tissue:
         Of the bonds, of the walls, and of the contacts that keep bonds from reversing, kappa0 l0^2.
         Where the last is not zero, the state is a minimum with those contacts, not without.
     gradient : float
-        Largest component of the gradient left, contacts included, by position or by orientation
+        Largest component of the gradient, contacts included, by position or by orientation
         over Delta (at least 0.02), kappa0 l0.
     converged : bool
         Whether the gradient fell below the tolerance; never true for a bare anneal.
@@ -175,9 +175,9 @@ def simulate(
         orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),
         tension=cell_tension(state, lattice, parameters.delta, model.tension),
         energy=minimum.energy,
-        wall_energy=minimum.walled - touching,
+        wall_energy=minimum.wall_energy - touching,
         contact_energy=touching,
-        gradient=minimum.gradient,
+        gradient=minimum.residual_gradient,
         converged=minimum.converged and accuracy.minimised,
         inverted_fraction=inverted_fraction(state, lattice),
         gradient_evaluations=minimum.evaluations,
@@ -225,9 +225,9 @@ def _solve(system: System, delta: float, accuracy: Accuracy, rng: Generator) -> 
         delta,
         accuracy.contraction,
         rng,
-        rounds=accuracy.rounds,
-        sweeps=accuracy.round_sweeps,
+        hops=accuracy.hops,
+        sweeps=accuracy.hop_sweeps,
     )
-    sweeps += accuracy.rounds * accuracy.round_sweeps
+    sweeps += accuracy.hops * accuracy.hop_sweeps
     sweeps += len(steps_to(delta, accuracy.contraction.shortening)) * accuracy.contraction.sweeps
     return minimum, sweeps

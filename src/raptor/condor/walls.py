@@ -89,7 +89,7 @@ def near_kernel(x, y, z, walls):
 
 
 @kernel
-def wall_energy(x, y, z, walls):
+def wall_energy_kernel(x, y, z, walls):
     """Wall energy of one cell (kappa0 l0^2), and its gradient along x, y and z (kappa0 l0)."""
     if not near_kernel(x, y, z, walls):
         return 0.0, 0.0, 0.0, 0.0

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from raptor.condor.contract import CONTACT, steps_to
 from raptor.condor.gpu.agitate import agitate
-from raptor.condor.gpu.energy import cell_tension, objective, reversed_bonds, units
+from raptor.condor.gpu.energy import cell_tension, inverted_fraction, objective, units
 from raptor.condor.gpu.layout import BLOCK, Batch, Cast, build_batch
 from raptor.condor.gpu.minimise import Goal, Minimiser
 from raptor.condor.simulate import Accuracy, Tissue, accuracy_named, undrifted
@@ -30,7 +30,7 @@ TOGETHER = 0.25  # part of the tissues that must have finished a step before the
 PATIENCE = 100  # evaluations after which those that have are looked at anyway
 LOOK = 5  # evaluations between looks at who is done, for which a GPU must wait
 BYTES_A_CELL = 2000  # measured at most 1,750: neighbours, pairs, states, and copies while a batch changes
-PHASES = 3  # of a step: minimised; unfolded from there; unfolded from where the step began
+PHASES = 3  # of a step: minimised; with contacts from there; with contacts from where the step began
 
 
 @dataclass(frozen=True)
@@ -167,9 +167,9 @@ class BatchSolver:
             each(delta),
             each(0.0),
             each(rules.tolerance),
-            each(rules.settled),
+            each(rules.ftol),
             each(False, torch.bool),
-            each(rules.limit, torch.int64),
+            each(rules.max_evaluations, torch.int64),
         )
 
     def _begin(self, chosen: NDArray[np.bool_], contact: float = 0.0) -> None:
@@ -182,7 +182,7 @@ class BatchSolver:
         last = [len(self.targets[n]) - 1 == k for n, k in zip(progress.task, progress.step, strict=True)]
         goal.delta[rows] = torch.tensor(ahead, dtype=torch.float64, device=self.device)
         goal.contact[rows] = contact
-        thorough = np.array(last) & (self.accuracy.contraction.settled >= 0)
+        thorough = np.array(last) & (self.accuracy.contraction.ftol >= 0)
         goal.thorough = torch.where(mask, self._mask(thorough), goal.thorough)
         shaken = chosen & (progress.phase == 0) & (goal.delta > 0).cpu().numpy()
         if self.accuracy.contraction.sweeps and shaken.any():
@@ -220,20 +220,20 @@ class BatchSolver:
         """Begin the next phase or step of the tissues that have finished one; returns who has none."""
         minimiser, progress = self._busy(), self.progress
         progress.used[idle] += minimiser.used.cpu().numpy()[idle]
-        folded = np.zeros_like(idle)
+        inverted = np.zeros_like(idle)
         if self.accuracy.contraction.shortening < 1:
-            share = reversed_bonds(minimiser.batch, minimiser.state).cpu().numpy()
-            folded = idle & (share > 0) & (progress.phase < PHASES - 1)
+            share = inverted_fraction(minimiser.batch, minimiser.state).cpu().numpy()
+            inverted = idle & (share > 0) & (progress.phase < PHASES - 1)
         through = np.array([len(self.targets[n]) - 1 for n in progress.task]) == progress.step
-        retired, onward = idle & ~folded & through, idle & ~folded & ~through
-        progress.phase[folded] += 1
+        retired, onward = idle & ~inverted & through, idle & ~inverted & ~through
+        progress.phase[inverted] += 1
         progress.phase[onward] = 0
         progress.step[onward] += 1
-        back = self._mask(folded & (progress.phase == PHASES - 1))
+        back = self._mask(inverted & (progress.phase == PHASES - 1))
         minimiser.state = torch.where(self._at(back), self.began, minimiser.state)
         self.began = torch.where(self._at(self._mask(onward)), units(minimiser.state)[0], self.began)
-        if folded.any():
-            self._begin(folded, CONTACT)
+        if inverted.any():
+            self._begin(inverted, CONTACT)
         if onward.any():
             self._begin(onward)
         return np.asarray(retired)
@@ -247,9 +247,10 @@ class BatchSolver:
         found = objective(batch, state, goal.delta, goal.contact)
         tension = cell_tension(batch, state, goal.delta, self.model.tension).cpu().numpy().ravel()
         cells = state.movedim(1, 2).reshape(-1, 6).double().cpu().numpy()
-        folded = reversed_bonds(batch, state).tolist()
-        energies = [values.tolist() for values in (found.energy, found.wall, found.touching, part.left)]
-        small = (part.left <= goal.tolerance * goal.lever).tolist()
+        inverted = inverted_fraction(batch, state).tolist()
+        reported = (found.energy, found.wall, found.touching, part.residual_gradient)
+        energies = [values.tolist() for values in reported]
+        small = (part.residual_gradient <= goal.tolerance * goal.lever).tolist()
         first = 0
         for row, number in enumerate(progress.task.tolist()):
             task = self.tasks[number]
@@ -259,7 +260,7 @@ class BatchSolver:
             blocks = np.concatenate([moved[:, :3].T.ravel(), moved[:, 3:].T.ravel()])
             if not task.mould.tethers:
                 blocks = undrifted(blocks, task.cast.sites, task.mould)
-            energy, wall, touching, left = (values[row] for values in energies)
+            energy, wall, touching, residual = (values[row] for values in energies)
             finite = bool(np.isfinite(blocks).all() and np.isfinite(energy))
             yield (
                 number,
@@ -271,9 +272,9 @@ class BatchSolver:
                     energy=energy,
                     wall_energy=wall,
                     contact_energy=touching,
-                    gradient=left,
+                    gradient=residual,
                     converged=finite and small[row],
-                    inverted_fraction=folded[row],
+                    inverted_fraction=inverted[row],
                     gradient_evaluations=used,
                     sweeps=len(self.targets[number]) * self.accuracy.contraction.sweeps,
                     wall_time=seconds * used * n,

@@ -190,7 +190,7 @@ def wall_terms(
     return energy, push * slope_x / SPACING, push * slope_y / SPACING, -batch.wall * below
 
 
-def reversed_bonds(batch: Batch, state: Tensor) -> Tensor:
+def inverted_fraction(batch: Batch, state: Tensor) -> Tensor:
     """Share of each tissue's bonds whose direction has reversed since casting, (tissues,) float64."""
     flat, along = state.reshape(-1), batch.directions.unit.to(state.dtype)
     count = torch.zeros(batch.blocks, dtype=torch.int64, device=state.device)

@@ -29,20 +29,20 @@ class Goal:
         Cell-matrix interaction, and stiffness of contacts, kappa0.
     tolerance : Tensor
         Largest component of the gradient, kappa0 l0 times the orientations' lever.
-    settled : Tensor
+    ftol : Tensor
         Part by which `WINDOW` evaluations must lower the energy; less than zero counts for nothing.
     thorough : Tensor
         Whether both must be met, not one.
-    limit : Tensor
+    max_evaluations : Tensor
         Evaluations at most.
     """
 
     delta: Tensor
     contact: Tensor
     tolerance: Tensor
-    settled: Tensor
+    ftol: Tensor
     thorough: Tensor
-    limit: Tensor
+    max_evaluations: Tensor
 
     @property
     def lever(self) -> Tensor:
@@ -53,8 +53,8 @@ class Goal:
 class Minimiser:
     """Minimises a batch in step. States are (blocks, 6, BLOCK), numbers of tissues (tissues,).
 
-    `state` and `energy`, `walled`, `left` (largest component of the gradient), `used` (evaluations) are
-    the tissues' as they stand; `busy` tells whose minimisation goes on.
+    `state`, `energy`, `wall_energy` (contacts included), `residual_gradient` (its largest component) and
+    `used` (evaluations) are the tissues' as they stand; `busy` tells whose minimisation goes on.
     """
 
     def __init__(self, batch: Batch, state: Tensor, goal: Goal) -> None:
@@ -73,8 +73,8 @@ class Minimiser:
         def zeros(kind: torch.dtype = torch.float64) -> Tensor:
             return torch.zeros(tissues, dtype=kind, device=device)
 
-        self.energy, self.walled, self.left, self.slope = zeros(), zeros(), zeros(), zeros()
-        self.length, self.looked_at = zeros(), zeros()
+        self.energy, self.wall_energy, self.residual_gradient = zeros(), zeros(), zeros()
+        self.slope, self.length, self.looked_at = zeros(), zeros(), zeros()
         self.used, self.looked, self.tries = (zeros(torch.int64) for _ in range(3))
         self.calm, self.busy = zeros(torch.bool), zeros(torch.bool)
 
@@ -108,14 +108,14 @@ class Minimiser:
         scaled = torch.cat([unit[:, :3], unit[:, 3:] * lever], dim=1)
         self.state = torch.where(here, scaled, self.state)
         found = objective(batch, self.state, goal.delta, goal.contact)
-        walled = found.wall + found.touching
+        wall_energy = found.wall + found.touching
         self.gradient = torch.where(here, found.gradient, self.gradient)
         self.energy = torch.where(chosen, found.energy, self.energy)
-        self.walled = torch.where(chosen, walled, self.walled)
+        self.wall_energy = torch.where(chosen, wall_energy, self.wall_energy)
         self.used = torch.where(chosen, 1, self.used)
         self.tries = torch.where(chosen, 0, self.tries)
         self.looked = torch.where(chosen, 1, self.looked)
-        self.looked_at = torch.where(chosen, found.energy + walled, self.looked_at)
+        self.looked_at = torch.where(chosen, found.energy + wall_energy, self.looked_at)
         self.calm &= ~chosen
         self.held &= ~chosen[:, None]
         self.busy |= chosen
@@ -127,13 +127,13 @@ class Minimiser:
         batch, goal = self.batch, self.goal
         trial = torch.add(self.state, batch.spread(self.length.float())[:, :, None] * self.direction)
         found = objective(batch, trial, goal.delta, goal.contact)
-        walled = found.wall + found.touching
-        total, before = found.energy + walled, self.energy + self.walled
+        wall_energy = found.wall + found.touching
+        total, before = found.energy + wall_energy, self.energy + self.wall_energy
         self.used += self.busy
         taken = self.busy & (total <= before + SUFFICIENT * self.length * self.slope)
         self._keep(taken, trial, found.gradient)
         self.energy = torch.where(taken, found.energy, self.energy)
-        self.walled = torch.where(taken, walled, self.walled)
+        self.wall_energy = torch.where(taken, wall_energy, self.wall_energy)
         refused = self.busy & ~taken
         self.tries = torch.where(refused, self.tries + 1, 0)
         # The minimum of the parabola through what is known, within bounds.
@@ -152,17 +152,19 @@ class Minimiser:
 
     def _judge(self, moved: Tensor) -> None:
         """Who has reached its goal, among those whose state has changed."""
-        goal, total = self.goal, self.energy + self.walled
+        goal, total = self.goal, self.energy + self.wall_energy
         look = moved & (self.used - self.looked >= WINDOW)
-        calm = self.looked_at - total <= goal.settled * total
+        calm = self.looked_at - total <= goal.ftol * total
         self.calm = torch.where(look, calm, self.calm)
         self.looked = torch.where(look, self.used, self.looked)
         self.looked_at = torch.where(look, total, self.looked_at)
         move, turn = self._largest(self.gradient, by_orientation=True)
-        self.left = torch.where(moved, torch.maximum(move, turn / goal.lever), self.left)
-        small = self.left <= goal.tolerance * goal.lever
+        self.residual_gradient = torch.where(
+            moved, torch.maximum(move, turn / goal.lever), self.residual_gradient
+        )
+        small = self.residual_gradient <= goal.tolerance * goal.lever
         done = torch.where(goal.thorough, small & self.calm, small | self.calm)
-        self.busy &= ~(done & moved) & (self.used < goal.limit)
+        self.busy &= ~(done & moved) & (self.used < goal.max_evaluations)
 
     def _largest(self, vector: Tensor, by_orientation: bool = False) -> tuple[Tensor, Tensor]:
         """Largest component by position, and by orientation (as for unit vectors), (tissues,) float64."""

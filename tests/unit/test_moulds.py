@@ -67,6 +67,31 @@ def test_moulds_survive_writing_and_reading(tmp_path):
     assert read_moulds(tmp_path / "moulds.geojson") == moulds
 
 
+def test_a_mould_takes_plain_shapes_and_its_holes_are_tethers(tmp_path):
+    bar, hole = shapely.box(-8, -8, 8, -6), shapely.box(-3, -3, 3, 3)
+    mould = Mould(shapely.box(-12, -12, 12, 12).difference(hole), tethers=[Circle(0, 8, 1), bar])
+    assert mould == Mould(mould.outline, (Circle(0, 8, 1), PolygonTether(bar), mould.tethers[2]))
+    assert not mould.outline.interiors
+    assert mould.tethers[2].polygon.equals(hole)
+    geometry = json.loads(shapely.to_geojson(shapely.MultiPolygon([mould.depression])))
+    assert read_mould(write(tmp_path / "m.geojson", geometry)).depression.equals(mould.depression)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "message"),
+    [
+        (("a square",), "the outline is of type str; give one shapely Polygon"),
+        ((shapely.MultiPolygon(),), "the outline is of type MultiPolygon"),
+        ((shapely.box(0, 0, 9, 9), [(3, 3, 1)]), "a tether is of type tuple; give a Circle or"),
+        ((shapely.box(0, 0, 9, 9), [shapely.Point(3, 3).buffer(2).difference(shapely.Point(3, 3).buffer(1))]),
+         "tether 1 has a hole; fill it"),
+    ],
+)  # fmt: skip
+def test_what_is_no_mould_is_named(shapes, message):
+    with pytest.raises(RaptorError, match=message):
+        Mould(*shapes)
+
+
 def test_masks_are_disjoint_and_cover_the_areas():
     mould = Mould(shapely.box(-20, -10, 20, 10), (Circle(5, 0, 4), PolygonTether(shapely.box(-9, -6, -5, 6))))
     image = mould_image(mould, 256)

@@ -92,18 +92,18 @@ def _mould(feature: dict[str, Any], path: Path) -> Mould:
     name = _name(feature, path)
     where = f"mould file {path}, {name}"
     geometry = feature.get("geometry") or {}
+    parts = geometry.get("coordinates") or []
     if geometry.get("type") == "MultiPolygon":
-        raise RaptorError(
-            f"{where}: the depression is given in {len(geometry.get('coordinates') or [])} pieces; "
-            "a mould is one connected outline"
-        )
-    if geometry.get("type") != "Polygon":
+        if len(parts) != 1:
+            raise RaptorError(
+                f"{where}: the depression is given in {len(parts)} pieces; a mould is one connected outline"
+            )
+        parts = parts[0]
+    elif geometry.get("type") != "Polygon":
         raise RaptorError(f"{where}: geometry is {geometry.get('type')}; a Polygon is expected")
-    rings = geometry.get("coordinates") or []
-    if len(rings) > 1:
-        raise RaptorError(f"{where}: the outline has a hole; describe what stands in it as tethers")
     _require_known(properties, where)
-    outline = _polygon(rings[0] if rings else [], f"{where}: the outline")
+    rings = [_polygon(ring, f"{where}: the outline") for ring in parts or [[]]]
+    outline = shapely.Polygon(rings[0].exterior, [hole.exterior for hole in rings[1:]])
     tethers = tuple(
         _tether(entry, f"{where}: tether {number}")
         for number, entry in enumerate(properties.get("tethers") or [], start=1)

@@ -1,5 +1,6 @@
 """A mould: the outline of its depression and the tethers that stand in it. Lengths in l0."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
@@ -119,16 +120,16 @@ class PolygonTether:
 Tether = Circle | PolygonTether
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Mould:
-    """A depression and its tethers.
+    """A depression and its tethers, lengths in l0, the origin at the centre of the image of 62.5 l0.
 
     Parameters
     ----------
     outline : shapely.Polygon
-        The depression, without holes for the tethers, l0.
-    tethers : tuple of Tether
-        Regions inside it that hold no cells.
+        The depression. Its holes, if it has any, become tethers.
+    tethers : sequence of Circle, PolygonTether or shapely.Polygon
+        What stands in it and holds no cells; kept as a tuple of Circle and PolygonTether.
     symmetry : str
         The class that the generator drew from, a key of `random_moulds.GROUPS`, or "unknown".
     name : str
@@ -138,14 +139,34 @@ class Mould:
     ------
     RaptorError
         Where the outline or a tether cannot be cast: see `validate`.
+
+    Examples
+    --------
+    >>> square = shapely.box(-12, -12, 12, 12)
+    >>> mould = Mould(square, tethers=[Circle(0, 5, 1), shapely.box(-8, -8, 8, -6)])
     """
 
     outline: shapely.Polygon
-    tethers: tuple[Tether, ...] = ()
-    symmetry: str = "unknown"
-    name: str = field(default="mould", compare=False)
+    tethers: tuple[Tether, ...]
+    symmetry: str
+    name: str = field(compare=False)
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        outline: shapely.Polygon,
+        tethers: Iterable[Tether | shapely.Polygon] = (),
+        symmetry: str = "unknown",
+        name: str = "mould",
+    ) -> None:
+        if not isinstance(outline, shapely.Polygon):
+            raise RaptorError(
+                f"{name}: the outline is of type {type(outline).__name__}; give one shapely Polygon, in l0"
+            )
+        solid = shapely.Polygon(outline.exterior) if outline.interiors else outline
+        holes = map(shapely.Polygon, outline.interiors)
+        standing = tuple(_tether(each, name) for each in (*tethers, *holes))
+        # The values of a frozen dataclass cannot be set by name.
+        vars(self).update(outline=solid, tethers=standing, symmetry=symmetry, name=name)
         self.validate()
 
     def validate(self) -> None:
@@ -205,6 +226,17 @@ class Mould:
         }
 
 
+def _tether(shape: Any, name: str) -> Tether:
+    """A tether as a mould keeps it."""
+    if isinstance(shape, shapely.Polygon):
+        return PolygonTether(shape)
+    if not isinstance(shape, Tether):
+        raise RaptorError(
+            f"{name}: a tether is of type {type(shape).__name__}; give a Circle or a shapely Polygon"
+        )
+    return shape
+
+
 def require_standing(tether: Tether, outline: shapely.Polygon, what: str) -> None:
     """Raise a RaptorError, which calls the tether `what`, unless it holds cells back in a valid outline."""
     tether.validate(what)
@@ -231,7 +263,7 @@ def _validate_polygon(polygon: shapely.Polygon, what: str) -> None:
             f"{what} is not a simple polygon ({explain_validity(polygon)}); draw it so that no edges cross"
         )
     if polygon.interiors:
-        raise RaptorError(f"{what} has a hole; describe what stands in the depression as tethers")
+        raise RaptorError(f"{what} has a hole; fill it: cells are never cast inside a tether")
 
 
 def _transform(polygon: shapely.Polygon, matrix: NDArray[np.float64]) -> shapely.Polygon:

@@ -32,6 +32,23 @@ def find_mould(name: str | Path) -> Path:
     return MOULDS[str(name)]
 
 
+def as_mould(mould: Mould | str | Path) -> Mould:
+    """A mould as it is, or the one that a name of the library or a file stands for.
+
+    Raises
+    ------
+    RaptorError
+        As `read_mould`, and where it is anything else.
+    """
+    if isinstance(mould, Mould):
+        return mould
+    if isinstance(mould, (str, Path)):
+        return read_mould(mould)
+    raise RaptorError(
+        f"a mould is of type {type(mould).__name__}; give a raptor.Mould, a name of the library or a file"
+    )
+
+
 def read_mould(path: str | Path, scale: float | None = None) -> Mould:
     """Read a mould of the library, or a file that holds one mould.
 

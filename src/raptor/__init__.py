@@ -4,10 +4,20 @@ CONDOR, a model of force-dipole cells on a face-centred-cubic spring network, si
 cell-laden hydrogel contracts in a tethered mould; networks trained on thousands of such
 simulations predict the same fields in a fraction of a second.
 
+    import raptor
+
+    mould = raptor.read_mould("mould.svg")
+    cells = raptor.CellParameters(delta=0.5, kappa_nnn=0.5, kappa_nnnn=0.3)
+    tissue = raptor.simulate(mould, cells)
+    prediction = raptor.predict(mould, cells)
+    raptor.plot(tissue).savefig("tissue.png")
+
+`docs/python.md` shows all of it. Names are those of `__init__.pyi`; each is imported when it is first used.
+
 Source of the methods: A. E. Andrews et al., "Rapid prediction of organisation in engineered
 corneal, glial and fibroblast tissues using machine learning and biophysical models" (2025).
 """
 
-from raptor.core.version import MODEL_VERSION, __version__
+import lazy_loader
 
-__all__ = ["MODEL_VERSION", "__version__"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,6 +12,13 @@ from raptor.core.errors import RaptorError
 SHELL_DISTANCE = {1: 1.0, 2: sqrt(2.0), 3: sqrt(3.0), 4: 2.0}
 """Distance of the neighbour shells of the face-centred-cubic lattice, in l0."""
 
+PARAMETERS = {
+    "delta": "strength of the cell-matrix interaction",
+    "kappa_nnn": "spring constant of the second kind of bond, in kappa0",
+    "kappa_nnnn": "spring constant of the third kind of bond, in kappa0",
+}
+"""Names of the cell and matrix parameters, and what each means."""
+
 
 @dataclass(frozen=True)
 class Bounds:
@@ -90,6 +97,22 @@ class CellParameters:
                 f"{largest:.4g}; lower kappa_nnnn or raise kappa_nnn"
             )
         return self
+
+
+def require_parameters(cells: CellParameters) -> CellParameters:
+    """Return what is given if it is parameters, else raise.
+
+    Raises
+    ------
+    RaptorError
+        Where it is anything else.
+    """
+    if not isinstance(cells, CellParameters):
+        raise RaptorError(
+            f"cells are of type {type(cells).__name__}; give raptor.CellParameters(delta, kappa_nnn, "
+            "kappa_nnnn), or the fit of a tissue: raptor.tissue(name).fit"
+        )
+    return cells
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,10 @@
 import re
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
@@ -15,8 +19,18 @@ from raptor.condor.minimise import Minimum
 from raptor.condor.system import System, build_system, cast_state
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
+from raptor.fields.labelled import labelled
+from raptor.fields.shape import density_threshold, shape_ratios
 from raptor.moulds.geometry import Mould
-from raptor.parameters import CellParameters, NetworkModel
+from raptor.moulds.reading import as_mould
+from raptor.parameters import CellParameters, NetworkModel, require_parameters
+from raptor.raster import rasterise
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PIXELS = 256
+"""Along a side of the paper's image, which shape is measured in."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +40,7 @@ class Accuracy:
     Parameters
     ----------
     solver : str
-        Name written to files.
+        Name of the solver.
     contraction : Contraction
         How closely the contraction is followed, and its tolerance.
     hops, hop_sweeps : int
@@ -37,6 +51,8 @@ class Accuracy:
         Whether the last state is a minimum; a bare anneal's is not.
     precision : str
         "float64" or "float32".
+    name : str
+        By which `accuracy_named` knows it.
     """
 
     solver: str
@@ -46,6 +62,7 @@ class Accuracy:
     anneal_sweeps: int = 0
     minimised: bool = True
     precision: str = "float64"
+    name: str = "its own"
 
     @property
     def contracts_alone(self) -> bool:
@@ -86,15 +103,21 @@ def accuracy_named(name: str) -> Accuracy:
         accuracy = ACCURACIES[base]
     else:
         raise RaptorError(f"accuracy is '{name}'; allowed are {ALLOWED}")
-    return replace(accuracy, precision="float32") if name != base else accuracy
+    return replace(accuracy, precision="float64" if name == base else "float32", name=name)
 
 
 @dataclass(frozen=True)
 class Tissue:
-    """A simulated tissue and how it was reached.
+    """A simulated tissue and how it was reached: what `simulate` returns.
 
     Parameters
     ----------
+    mould : Mould
+    parameters : CellParameters
+    model : NetworkModel
+    accuracy : str
+    seed : int
+        What was simulated.
     sites, positions : ndarray (cells, 3)
         Cast and final positions, l0.
     orientation : ndarray (cells, 3)
@@ -117,6 +140,11 @@ class Tissue:
         Seconds.
     """
 
+    mould: Mould
+    parameters: CellParameters
+    model: NetworkModel
+    accuracy: str
+    seed: int
     sites: NDArray[np.float64]
     positions: NDArray[np.float64]
     orientation: NDArray[np.float64]
@@ -136,44 +164,122 @@ class Tissue:
         """Number of cells."""
         return len(self.sites)
 
+    @property
+    def layers(self) -> int:
+        """Cell layers between the mould's floor and the fill height."""
+        return self.model.layers
+
+    @property
+    def area_ratio(self) -> float:
+        """A/A0; NaN where a mould of few cells lies between the pixels."""
+        return self._ratios[0]
+
+    @property
+    def width_ratio(self) -> float:
+        """w/w0 of the central section; NaN where it holds no tissue as cast."""
+        return self._ratios[1]
+
+    def fields(self, pixels: int = PIXELS) -> "xr.Dataset":
+        """The eight fields (y, x) per pixel, named, with masks, parameters and the mould.
+
+        See `raptor.fields.labelled` for what the Dataset holds.
+
+        Parameters
+        ----------
+        pixels : int
+            Along a side of the image of 62.5 l0.
+
+        Raises
+        ------
+        RaptorError
+            Where the depression covers no pixel.
+        """
+        return labelled(
+            self.rasterised(pixels),
+            self.mould,
+            self.parameters,
+            title="A tissue simulated by CONDOR",
+            layers=self.layers,
+            threshold=density_threshold(self.layers, pixels),
+            accuracy=self.accuracy,
+            seed=self.seed,
+        )
+
+    def rasterised(self, pixels: int = PIXELS) -> NDArray[np.float64]:
+        """The eight fields as one array (8, y, x) in the order `symmetry.FIELDS`, per pixel."""
+        return rasterise(self.positions, self.orientation, self.tension, pixels)
+
+    @cached_property
+    def _ratios(self) -> tuple[float, float]:
+        try:
+            return shape_ratios(self.rasterised()[0], self.mould, self.layers)
+        except RaptorError:
+            return nan, nan
+
     def __str__(self) -> str:
         state = "converged" if self.converged else "NOT converged"
         return f"{self.cells} cells, energy {self.energy:.5g}, {state}, {self.wall_time:.2f} s"
 
 
 def simulate(
-    mould: Mould,
-    parameters: CellParameters,
-    model: NetworkModel,
+    mould: Mould | str | Path,
+    cells: CellParameters,
+    layers: int | NetworkModel = 7,
     accuracy: str | Accuracy = "standard",
     seed: int = 0,
 ) -> Tissue:
     """Cast a mould, let it contract, and return the tissue.
 
-    The result hangs on the arguments alone; the seed sets the first orientations and every
-    trial move.
+    The result hangs on the arguments alone.
+
+    Parameters
+    ----------
+    mould : Mould, str or Path
+        A mould, or what `read_mould` reads: a name of the library, or a file.
+    cells : CellParameters
+        Delta and both spring constants, each in the range that the model allows.
+    layers : int or NetworkModel
+        Cell layers between the mould's floor and the fill height; or all the choices that the paper leaves
+        open.
+    accuracy : str or Accuracy
+        "draft", "standard" or "reference", from the fastest to the most accurate; `ALLOWED` names the others.
+    seed : int
+        Of the first orientations and of every trial move, not negative.
 
     Raises
     ------
     RaptorError
-        Where the mould holds no cell or the accuracy has no such name.
+        Where the mould cannot be read or holds no cell, or another argument is none that is allowed.
+
+    Examples
+    --------
+    >>> tissue = simulate("glial_1", CellParameters(0.5, 0.5, 0.3))
     """
+    mould, cells = as_mould(mould), require_parameters(cells)
+    model = layers if isinstance(layers, NetworkModel) else NetworkModel(layers)
+    if seed < 0:
+        raise RaptorError(f"seed is {seed}; give a whole number, 0 or more")
     if isinstance(accuracy, str):
         accuracy = accuracy_named(accuracy)
     started = time.perf_counter()
     rng = np.random.default_rng(seed)
-    system = build_system(mould, parameters, model, accuracy.precision)
+    system = build_system(mould, cells, model, accuracy.precision)
     lattice = system.lattice
-    minimum, sweeps = _solve(system, parameters.delta, accuracy, rng)
+    minimum, sweeps = _solve(system, cells.delta, accuracy, rng)
     state = minimum.state.astype(np.float64)
-    touching = _contact_energy(minimum, system, parameters.delta)
+    touching = _contact_energy(minimum, system, cells.delta)
     if not mould.tethers:
         state = undrifted(state, lattice.sites, mould)
     return Tissue(
+        mould=mould,
+        parameters=cells,
+        model=model,
+        accuracy=accuracy.name,
+        seed=seed,
         sites=lattice.sites,
         positions=state[: 3 * lattice.cells].reshape(3, -1).T.copy(),
         orientation=state[3 * lattice.cells :].reshape(3, -1).T.copy(),
-        tension=cell_tension(state, lattice, parameters.delta, model.tension),
+        tension=cell_tension(state, lattice, cells.delta, model.tension),
         energy=minimum.energy,
         wall_energy=minimum.wall_energy - touching,
         contact_energy=touching,

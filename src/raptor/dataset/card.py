@@ -13,7 +13,8 @@ from raptor.dataset.design import SPLITS, Run
 from raptor.dataset.examples import Example
 from raptor.dataset.netcdf import REFERENCES
 from raptor.dataset.shards import Shard
-from raptor.dataset.stack import LONG_NAMES, read_table
+from raptor.dataset.stack import read_table
+from raptor.fields.labelled import LONG_NAMES
 from raptor.moulds.geometry import Mould
 
 TEMPLATE = """# Data set card: {name}

@@ -7,10 +7,12 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
 from raptor.dataset.netcdf import open_file
-from raptor.dataset.shards import PARAMETERS, RESULTS, read_failures, shard_paths
-from raptor.dataset.stack import LONG_NAMES, read_table
+from raptor.dataset.shards import RESULTS, read_failures, shard_paths
+from raptor.dataset.stack import read_table
+from raptor.fields.labelled import LONG_NAMES
 from raptor.frame import pixel_size
 from raptor.moulds.geojson import moulds_by_id
+from raptor.parameters import PARAMETERS
 from raptor.raster import SIGMA
 from raptor.symmetry import Element
 

@@ -15,13 +15,8 @@ from raptor.core.errors import RaptorError
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.parameters import CellParameters, NetworkModel
+from raptor.parameters import PARAMETERS, CellParameters, NetworkModel
 
-PARAMETERS = {
-    "delta": "strength of the cell-matrix interaction",
-    "kappa_nnn": "spring constant of the second kind of bond, in kappa0",
-    "kappa_nnnn": "spring constant of the third kind of bond, in kappa0",
-}
 RESULTS = {
     "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
     "wall_energy": "energy of the walls, in kappa0 l0^2",

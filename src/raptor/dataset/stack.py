@@ -12,21 +12,14 @@ from numpy.typing import NDArray
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.dataset.shards import PARAMETERS, Record, read_failures, read_shard, write_model
+from raptor.dataset.shards import Record, read_failures, read_shard, write_model
+from raptor.fields.labelled import LONG_NAMES
 from raptor.frame import pixel_centres
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
-from raptor.parameters import CellParameters
+from raptor.parameters import PARAMETERS, CellParameters
 from raptor.raster import rasterise
 from raptor.symmetry import FIELDS
-
-LONG_NAMES = {
-    "density": "cells per pixel",
-    "tension": "sum over cells of their mean bond tension, in kappa0 l0 per pixel",
-    "sxsx": "sum over cells of sx sx, per pixel", "sysy": "sum over cells of sy sy, per pixel",
-    "szsz": "sum over cells of sz sz, per pixel", "sxsy": "sum over cells of sx sy, per pixel",
-    "sxsz": "sum over cells of sx sz, per pixel", "sysz": "sum over cells of sy sz, per pixel",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from raptor.core.files import atomic_path
 from raptor.dataset.design import SPLITS
-from raptor.dataset.shards import PARAMETERS
 from raptor.dataset.stack import read_samples, read_table
 from raptor.frame import pixel_centres
+from raptor.parameters import PARAMETERS
 from raptor.symmetry import FIELDS
 
 FOLDERS = {"train": "train", "validation": "valid", "test": "test"}

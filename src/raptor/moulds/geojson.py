@@ -45,7 +45,7 @@ def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
     if not features:
         raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
     try:
-        return [_mould(f, path) for f in features if only is None or _name(f, path) in only]
+        return [from_feature(f, path) for f in features if only is None or _name(f, path) in only]
     except (AttributeError, TypeError, KeyError, IndexError) as error:
         raise RaptorError(f"mould file {path} is not GeoJSON of a mould: {error}") from error
 
@@ -87,7 +87,14 @@ def _name(feature: dict[str, Any], path: Path) -> str:
     return str((feature.get("properties") or {}).get("mould", path.stem))
 
 
-def _mould(feature: dict[str, Any], path: Path) -> Mould:
+def from_feature(feature: dict[str, Any], path: Path = Path("GeoJSON")) -> Mould:
+    """A mould from a GeoJSON feature, as `Mould.as_feature` gives it; messages name the file `path`.
+
+    Raises
+    ------
+    RaptorError
+        Where it cannot be cast.
+    """
     properties = feature.get("properties") or {}
     name = _name(feature, path)
     where = f"mould file {path}, {name}"

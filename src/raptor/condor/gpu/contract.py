@@ -265,6 +265,11 @@ class BatchSolver:
             yield (
                 number,
                 Tissue(
+                    mould=task.mould,
+                    parameters=task.parameters,
+                    model=self.model,
+                    accuracy=self.accuracy.name,
+                    seed=task.seed,
                     sites=task.cast.sites,
                     positions=blocks[: 3 * n].reshape(3, -1).T.copy(),
                     orientation=blocks[3 * n :].reshape(3, -1).T.copy(),

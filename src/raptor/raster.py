@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE, pixel_size
-from raptor.symmetry import FIELDS
 
 SIGMA = 3 * 125 / 512
 """Width of the Gaussian, l0 (3 pixels of the paper's 256-pixel image)."""
@@ -97,10 +96,25 @@ def rasterise(
             f"{len(positions)} positions, {len(orientation)} orientations and {len(tension)} "
             "tensions given; one of each a cell is expected"
         )
-    image = np.zeros((len(FIELDS), pixels, pixels))
+    return _image(positions, channels_of(orientation, tension), pixels)
+
+
+def density_image(positions: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
+    """Density per pixel (pixels, pixels) of cells at positions (cells, 2 or 3), l0."""
+    return np.asarray(_image(positions, np.ones((len(positions), 1)), pixels)[0])
+
+
+def _image(positions: NDArray[np.float64], values: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
+    """Sums (channels, pixels, pixels) over cells of their values (cells, channels), blurred."""
+    image = np.zeros((values.shape[1], pixels, pixels))
     x, y = (np.ascontiguousarray(positions[:, axis]) for axis in (0, 1))
-    _rasterise_kernel(x, y, channels_of(orientation, tension), pixel_size(pixels), image)
+    _rasterise_kernel(x, y, values, pixel_size(pixels), image)
     return image
+
+
+def density_threshold(layers: int, pixels: int) -> float:
+    """Density per pixel above which there is tissue: 0.2 at 7 layers and 256 pixels (paper)."""
+    return 0.48 * layers * pixel_size(pixels) ** 2
 
 
 def normalised(fields: NDArray[np.floating], cells: int) -> NDArray[np.floating]:

@@ -23,8 +23,9 @@ from raptor.dataset import run as running
 from raptor.dataset.check import check_shard
 from raptor.dataset.design import sample_design
 from raptor.dataset.shards import read_shard, write_shard
-from raptor.fields.shape import area_ratio, density_threshold
-from raptor.moulds import Circle, Mould, mould_image
+from raptor.fields.shape import area_ratio
+from raptor.moulds import Circle, Mould
+from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 from tests.small import CONFIG
@@ -207,7 +208,6 @@ def contracted():
 def test_sixteen_tissues_agree_within_the_spread_of_seeds(contracted):
     chosen, together, alone = contracted
     assert sorted(together) == list(range(16))
-    threshold = density_threshold(MODEL.layers, 128)
     energies, others, areas, spread_of_areas = [], [], [], []
     for number, task in enumerate(chosen):
         ours, theirs = together[number], alone[number]
@@ -217,9 +217,9 @@ def test_sixteen_tissues_agree_within_the_spread_of_seeds(contracted):
         mean = np.mean([s.energy for s in theirs])
         energies.append((ours.energy - mean) / scale)
         others += [(s.energy - mean) / scale for s in theirs]
-        image = mould_image(task.mould, 128)
+        cast = CastMould(task.mould, MODEL.layers, 128)
         ratios = [
-            area_ratio(rasterise(s.positions, s.orientation, s.tension, 128)[0], image, threshold)
+            area_ratio(rasterise(s.positions, s.orientation, s.tension, 128)[0], cast)
             for s in (ours, *theirs)
         ]
         areas.append(ratios[0] - np.mean(ratios[1:]))

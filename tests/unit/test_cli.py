@@ -12,11 +12,11 @@ import xarray as xr
 from PIL import Image
 
 from raptor.cli import COMMANDS
-from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.dataset.check import check
 from raptor.moulds import Mould, read_mould, write_moulds
+from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
 
 ROOT = Path(__file__).parents[2]
@@ -236,15 +236,16 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path):
 def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
     """The tissue that is fitted is one of the simulator's own, a little off the start."""
     from raptor.condor.simulate import simulate
-    from raptor.fields.shape import density_threshold, shape_ratios
+    from raptor.fields.shape import shape_ratios
+    from raptor.moulds.cast import CastMould
     from raptor.parameters import CellParameters, NetworkModel
-    from raptor.raster import rasterise
+    from raptor.raster import density_threshold, rasterise
 
     mould = read_mould(Path(MOULD))
     made = simulate(mould, CellParameters(0.35, 0.5, 0.3), NetworkModel(1), "draft", 3)
     density = rasterise(made.positions, made.orientation, made.tension, 256)[0]
     if what == "ratios":
-        area, width = shape_ratios(density, mould, 1)
+        area, width = shape_ratios(density, CastMould(mould, 1, 256))
         target = ("--area-ratio", area, "--width-ratio", width)
     else:
         tissue = density < density_threshold(1, 256)

@@ -17,10 +17,11 @@ from raptor.dataset.loader import ExampleSet
 from raptor.dataset.run import simulate_shard
 from raptor.dataset.shards import write_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
-from raptor.fields.shape import density_threshold, ratios_above
+from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_centres
 from raptor.moulds import Mould, moulds_by_id
-from raptor.moulds.raster import mould_image
+from raptor.moulds.cast import CastMould
+from raptor.raster import density_threshold
 from raptor.studies.active_learning import enriched
 from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
 from raptor.surrogate.bands import LEVELS, Bands, fit_scale
@@ -101,20 +102,20 @@ def test_what_is_far_from_all_points_is_novel():
 def test_the_edge_of_softer_images_is_found():
     """Blurred tissues that fill less and less of a mould, at a threshold below half of their density."""
     mould = Mould(shapely.box(-20, -10, 20, 10))
-    image = mould_image(mould, 128)
+    cast = CastMould(mould, 1, 128)
     x, y = np.meshgrid(pixel_centres(128), pixel_centres(128))
     silhouettes = []
     for part in (0.5, 0.6, 0.7, 0.8):
         sharp = 1 / (1 + np.exp(4 * np.maximum(np.abs(x) - 20 * part, np.abs(y) - 10 * part)))
         soft = gaussian_filter(sharp, 3.0)
-        true = ratios_above(sharp, image, mould, 0.3)
-        silhouettes.append(Silhouette(image, mould, true, soft, soft[None]))
+        true = shape_ratios(sharp, cast, 0.3)
+        silhouettes.append(Silhouette(cast, true, soft, soft[None]))
     edge = fit_edge(silhouettes, 0.3)
     assert edge > 1.02
     before, after = (np.mean([np.abs(s.error(e * 0.3)) for s in silhouettes]) for e in (1.0, edge))
     assert after < 0.5 * before
     assert silhouettes[0].errors(0.3).shape == (3, 2)
-    same = [replace(s, true=ratios_above(s.predicted, image, mould, 0.3)) for s in silhouettes]
+    same = [replace(s, true=shape_ratios(s.predicted, cast, 0.3)) for s in silhouettes]
     assert fit_edge(same, 0.3) == pytest.approx(1, abs=5e-3)
 
 

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from raptor.condor.simulate import simulate
 from raptor.core.errors import RaptorError
-from raptor.fields.shape import density_threshold, shape_ratios
+from raptor.fields.shape import shape_ratios
 from raptor.fitting import (
     Outline,
     Sampled,
@@ -47,6 +47,7 @@ from raptor.fitting.posterior import interpolation_error
 from raptor.fitting.targets import as_array, prior_density
 from raptor.frame import pixel_centres
 from raptor.moulds import Mould
+from raptor.moulds.cast import CastMould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters, NetworkModel
 from raptor.raster import rasterise
 
@@ -320,11 +321,11 @@ def test_what_is_seen_does_not_turn_with_the_mould():
     fields = rasterise(made.positions, made.orientation, made.tension, 128)
     turned = fields.swapaxes(1, 2)[:, :, ::-1].copy()  # a quarter turn
     turned[2], turned[3], turned[5] = turned[3].copy(), turned[2].copy(), -turned[5]
-    threshold = density_threshold(2, 128)
-    found = seen(fields, BOX, threshold)
-    other = seen(turned, Mould(shapely.box(-6, -12, 6, 12)), threshold)
+    cast = CastMould(BOX, 2, 128)
+    found = seen(fields, cast, cast.threshold)
+    other = seen(turned, CastMould(Mould(shapely.box(-6, -12, 6, 12)), 2, 128), cast.threshold)
     assert found == pytest.approx(other, abs=1e-6)
-    assert tuple(found[:2]) == shape_ratios(fields[0], BOX, 2)
+    assert found[:2].tolist() == shape_ratios(fields[0], cast).tolist()
     assert 0 < thickness_ratio(made) < 1.1
 
 

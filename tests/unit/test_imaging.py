@@ -24,7 +24,8 @@ from raptor.imaging import (
 )
 from raptor.imaging.illumination import fit_light
 from raptor.imaging.tissue import without_specks
-from raptor.moulds import Circle, Mould, mould_image, read_mould
+from raptor.moulds import Circle, Mould, read_mould
+from raptor.moulds.cast import CastMould
 from raptor.plotting.overlay import overlay_figure, write_overlay
 from tests.photograph import CASES, Camera, contracted, coverage, photograph
 
@@ -131,12 +132,12 @@ def test_landmarks_give_back_any_similarity():
 def test_an_aligned_mask_measures_what_the_density_does():
     x, y = np.meshgrid(pixel_centres(256), pixel_centres(256))
     mould = Mould(shapely.box(-20, -10, 24, 10), (Circle(-15, 5, 2), Circle(16, -6, 2)))
-    image = mould_image(mould, 256)
-    density = np.where(image.tethers, 0.0, np.exp(-((x / 14) ** 4) - ((y - 1) / (5 + 0.1 * x)) ** 4))
+    cast = CastMould(mould, 1, 256)
+    density = np.where(cast.tethers, 0.0, np.exp(-((x / 14) ** 4) - ((y - 1) / (5 + 0.1 * x)) ** 4))
     picture = as_picture(density[::-1] > 0.3, "mask")  # the top of a picture is the highest y
     found = measure(picture, mould, aligned(picture.values.shape))
-    assert found.area_ratio == pytest.approx(area_ratio(density, image, 0.3), abs=0.005)
-    assert found.width_ratio == pytest.approx(width_ratio(density, mould, 0.3), abs=0.01)
+    assert found.area_ratio == pytest.approx(area_ratio(density, cast, 0.3), abs=0.005)
+    assert found.width_ratio == pytest.approx(width_ratio(density, cast, 0.3), abs=0.01)
     shifted = as_picture(np.roll(density[::-1] > 0.3, 60, axis=0), "mask")
     with pytest.raises(RaptorError, match="lies outside the depression"):
         measure(shifted, mould, aligned(shifted.values.shape))

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 import shapely
 
-from raptor.condor.lattice import build_lattice, cast_sites, connect, shell_offsets
+from raptor.condor.lattice import build_lattice, connect, shell_offsets
 from raptor.condor.network import build_network, build_sublattices
 from raptor.moulds import Circle, Mould
+from raptor.moulds.cast import cast_sites
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 from tests import naive
 

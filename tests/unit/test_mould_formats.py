@@ -10,10 +10,10 @@ import pytest
 import shapely
 from PIL import Image
 
-from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.frame import pixel_centres
 from raptor.moulds import Circle, Mould, PolygonTether, read_mould
+from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
 from raptor.moulds.summary import summarise, symmetry_class
 

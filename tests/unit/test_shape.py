@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 import shapely
 
-from raptor.fields.shape import area_ratio, central_section, density_threshold, width_ratio
+from raptor.fields.shape import area_ratio, width_ratio
 from raptor.frame import pixel_centres
-from raptor.moulds import Circle, Mould, mould_image
-from raptor.studies.evaluation import cast_density
+from raptor.moulds import Circle, Mould
+from raptor.moulds.cast import CastMould, central_section
+from raptor.raster import density_threshold
 
 X, Y = np.meshgrid(pixel_centres(256), pixel_centres(256))
 
@@ -19,16 +20,20 @@ def smooth_box(half_x, half_y):
     return np.minimum(edge(X, half_x), edge(Y, half_y))
 
 
+def seen(outline, tethers=()):
+    return CastMould(Mould(outline, tethers), 1, 256)
+
+
 def test_width_is_found_between_pixels():
-    mould = Mould(shapely.box(-20, -10, 20, 10))
+    mould = seen(shapely.box(-20, -10, 20, 10))
     for half in (4.0, 4.03, 4.11, 7.77):
         assert width_ratio(smooth_box(15, half), mould, 0.5) == pytest.approx(half / 10, abs=2e-3)
 
 
 def test_width_is_measured_across_the_long_side_whichever_it_is():
-    tall = Mould(shapely.box(-10, -20, 10, 20))
+    tall = seen(shapely.box(-10, -20, 10, 20))
     assert width_ratio(smooth_box(6, 15), tall, 0.5) == pytest.approx(0.6, abs=2e-3)
-    square = Mould(shapely.box(-10, -10, 10, 10))  # x counts as the long side
+    square = seen(shapely.box(-10, -10, 10, 10))  # x counts as the long side
     assert width_ratio(smooth_box(9, 5), square, 0.5) == pytest.approx(0.5, abs=2e-3)
     tilted = Mould(shapely.affinity.rotate(shapely.box(-20, -10, 20, 10), 30))
     (x0, y0), (x1, y1) = central_section(tilted).coords
@@ -36,23 +41,21 @@ def test_width_is_measured_across_the_long_side_whichever_it_is():
 
 
 def test_tethers_on_the_section_count_as_no_depression():
-    mould = Mould(shapely.box(-20, -10, 20, 10), (Circle(0, 0, 2),))
+    mould = seen(shapely.box(-20, -10, 20, 10), (Circle(0, 0, 2),))
     assert width_ratio(smooth_box(15, 4), mould, 0.5) == pytest.approx(8 / 16, abs=2e-3)
 
 
 def test_a_section_without_depression_has_no_width():
     posts = tuple(Circle(0, y, 1.3) for y in (-3.7, -1.3, 1.3, 3.7))
-    assert np.isnan(width_ratio(smooth_box(1, 1), Mould(shapely.box(-10, -5, 10, 5), posts), 0.5))
+    assert np.isnan(width_ratio(smooth_box(1, 1), seen(shapely.box(-10, -5, 10, 5), posts), 0.5))
 
 
 @pytest.mark.parametrize("layers", [1, 4, 7])
 @pytest.mark.parametrize("pixels", [64, 128, 256])
 def test_a_tissue_that_did_not_contract_keeps_area_and_width(layers, pixels):
-    mould = Mould(shapely.box(-20.5, -10.5, 20.5, 10.5))
-    density = cast_density(mould, layers, pixels)
-    threshold = density_threshold(layers, pixels)
-    assert area_ratio(density, mould_image(mould, pixels), threshold) == pytest.approx(1, abs=0.06)
-    assert width_ratio(density, mould, threshold) == pytest.approx(1, abs=0.06)
+    cast = CastMould(Mould(shapely.box(-20.5, -10.5, 20.5, 10.5)), layers, pixels)
+    assert area_ratio(cast.density, cast) == pytest.approx(1, abs=0.06)
+    assert width_ratio(cast.density, cast) == pytest.approx(1, abs=0.06)
 
 
 def test_the_threshold_is_the_papers_at_its_scale():

@@ -72,12 +72,13 @@ def test_measured_are_the_ratios_of_each_simulation(small_mould, tmp_path):
     table = measure([tmp_path / "0.nc"], small_mould, MODEL.layers, 64)
     assert table["delta"].tolist() == [0.2, 0.9]
     assert table["area_ratio"].is_monotonic_decreasing
+    from raptor.moulds.cast import CastMould
     from raptor.raster import rasterise
 
     s = simulations[1]
     density = rasterise(s.positions, s.orientation, s.tension, 64)[0]
     assert table.loc[1, ["area_ratio", "width_ratio"]].tolist() == pytest.approx(
-        shape_ratios(density, small_mould, MODEL.layers), abs=0.01
+        shape_ratios(density, CastMould(small_mould, MODEL.layers, 64)), abs=0.01
     )
 
 

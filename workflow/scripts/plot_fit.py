@@ -6,9 +6,9 @@ from pathlib import Path
 from raptor.core.jobs import logged
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import record_fields
-from raptor.fields.shape import density_threshold
 from raptor.moulds import read_mould
 from raptor.plotting import fit_figure, save, save_fields
+from raptor.raster import density_threshold
 from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):

@@ -31,8 +31,8 @@ def draw(
       raptor draw mask.png --scale 0.05 --geojson mould.geojson
       raptor draw mask.png --like mould.geojson --json
     """
-    from raptor.condor.lattice import cast_sites
     from raptor.moulds import read_mould, write_moulds
+    from raptor.moulds.cast import cast_sites
     from raptor.moulds.summary import summarise
     from raptor.parameters import NetworkModel
 

@@ -49,7 +49,6 @@ def predict(
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3
           --output tissue.nc --picture tissue.png
     """
-    from raptor.condor.lattice import cast_sites
     from raptor.moulds import read_mould
     from raptor.surrogate.files import SHIPPED, load, write_prediction
 
@@ -57,7 +56,6 @@ def predict(
     shape = read_mould(mould, scale)
     require_writable(output, mould)
     require_picture_writable(picture, mould, output)
-    cast_sites(shape, 1)  # a mould without a cell has no tissue to predict
     surrogate = load(model or SHIPPED)
     prediction = surrogate.examine(shape, parameters)
     write_prediction(output, prediction, shape, parameters)

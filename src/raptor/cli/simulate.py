@@ -62,6 +62,7 @@ def simulate(
     from raptor.dataset.shards import write_shard
     from raptor.fields.shape import shape_ratios
     from raptor.moulds import read_mould
+    from raptor.moulds.cast import CastMould
     from raptor.parameters import NetworkModel
     from raptor.raster import rasterise
 
@@ -78,7 +79,7 @@ def simulate(
     write_shard(output, [run], {0: made}, model, accuracy, identity)
     fields = rasterise(made.positions, made.orientation, made.tension, PIXELS)
     try:
-        area, width = shape_ratios(fields[0], shape, layers)
+        area, width = map(float, shape_ratios(fields[0], CastMould(shape, layers, PIXELS)))
     except RaptorError:  # a mould of few cells may lie between the pixels
         area = width = nan
     if picture is not None:

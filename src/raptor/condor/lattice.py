@@ -1,20 +1,13 @@
-"""The cast lattice: face-centred cubic, (001) planes horizontal, cut out by the mould.
-
-Layer k lies at z = (k + 1/2) / sqrt 2; even layers have sites at integer x and y, odd layers at
-half-integer x and y, so that the point set has the full square symmetry about the image centre.
-"""
+"""The cast lattice: face-centred cubic, (001) planes horizontal, and the bonds between its sites."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.core.errors import RaptorError
-from raptor.frame import IMAGE_SIZE
-from raptor.moulds.geometry import STRICTLY, Mould
+from raptor.moulds.cast import HALF_SPAN, cast_sites
+from raptor.moulds.geometry import Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
-
-HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond
 
 
 @dataclass(frozen=True)
@@ -80,30 +73,6 @@ def build_lattice(mould: Mould, parameters: CellParameters, model: NetworkModel)
         Where no site lies inside the depression.
     """
     return connect(cast_sites(mould, model.layers), parameters, model)
-
-
-def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
-    """Sites (cells, 3) strictly inside a mould's depression, l0, by layer, then y, then x.
-
-    Raises
-    ------
-    RaptorError
-        Where there is none.
-    """
-    parts = []
-    for layer in range(layers):
-        axis = np.arange(-HALF_SPAN, HALF_SPAN + 1) + 0.5 * (layer % 2)
-        points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-        inside = points[mould.forbidden_depth(points) < -STRICTLY]
-        height = np.full(len(inside), (layer + 0.5) / np.sqrt(2))
-        parts.append(np.column_stack([inside, height]))
-    sites = np.concatenate(parts)
-    if len(sites) == 0:
-        raise RaptorError(
-            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites stand "
-            "1 l0 apart, so draw it larger"
-        )
-    return sites
 
 
 def connect(sites: NDArray[np.float64], parameters: CellParameters, model: NetworkModel) -> Lattice:

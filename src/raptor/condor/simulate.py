@@ -20,7 +20,8 @@ from raptor.condor.system import System, build_system, cast_state
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
 from raptor.fields.labelled import labelled
-from raptor.fields.shape import density_threshold, shape_ratios
+from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, NetworkModel, require_parameters
@@ -169,6 +170,11 @@ class Tissue:
         """Cell layers between the mould's floor and the fill height."""
         return self.model.layers
 
+    @cached_property
+    def cast_mould(self) -> CastMould:
+        """The mould as it was cast, and as an image of 256 pixels."""
+        return CastMould(self.mould, self.layers, PIXELS)
+
     @property
     def area_ratio(self) -> float:
         """A/A0; NaN where a mould of few cells lies between the pixels."""
@@ -194,13 +200,13 @@ class Tissue:
         RaptorError
             Where the depression covers no pixel.
         """
+        cast = self.cast_mould if pixels == PIXELS else CastMould(self.mould, self.layers, pixels)
         return labelled(
             self.rasterised(pixels),
-            self.mould,
+            cast,
             self.parameters,
             title="A tissue simulated by CONDOR",
-            layers=self.layers,
-            threshold=density_threshold(self.layers, pixels),
+            threshold=cast.threshold,
             accuracy=self.accuracy,
             seed=self.seed,
         )
@@ -212,9 +218,10 @@ class Tissue:
     @cached_property
     def _ratios(self) -> tuple[float, float]:
         try:
-            return shape_ratios(self.rasterised()[0], self.mould, self.layers)
+            area, width = shape_ratios(self.rasterised()[0], self.cast_mould)
         except RaptorError:
             return nan, nan
+        return float(area), float(width)
 
     def __str__(self) -> str:
         state = "converged" if self.converged else "NOT converged"

@@ -6,13 +6,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from raptor.condor.lattice import cast_sites
 from raptor.config.configuration import Configuration
 from raptor.config.sweep import Sweep
 from raptor.config.tradeoff import TradeoffCase
 from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
-from raptor.fields.shape import central_section
+from raptor.moulds.cast import cast_sites, central_section
 from raptor.moulds.library.tissues import MeasuredTissue
 from raptor.moulds.reading import read_mould
 

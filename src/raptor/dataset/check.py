@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from raptor.condor.energy import cell_tension, objective
-from raptor.condor.lattice import cast_sites
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
@@ -23,6 +22,7 @@ from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
 from raptor.frame import pixel_size
+from raptor.moulds.cast import cast_sites
 from raptor.moulds.geojson import moulds_by_id, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE, pixel_centres
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geojson import from_feature
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import PARAMETERS, CellParameters
 from raptor.symmetry import FIELDS
 
@@ -29,7 +29,7 @@ LONG_NAMES = {
 
 
 def labelled(
-    fields: NDArray[np.floating], mould: Mould, parameters: CellParameters, **attributes: Any
+    fields: NDArray[np.floating], cast: CastMould, parameters: CellParameters, **attributes: Any
 ) -> "xr.Dataset":
     """Fields (8, y, x) as a Dataset of eight variables (y, x), with masks, parameters and mould.
 
@@ -39,7 +39,7 @@ def labelled(
     Parameters
     ----------
     attributes : Any
-        Further attributes of the Dataset, such as `layers`.
+        Further attributes of the Dataset, such as `threshold`.
 
     Raises
     ------
@@ -48,18 +48,22 @@ def labelled(
     """
     import xarray as xr  # here: what only simulates need not wait for it
 
-    pixels = fields.shape[-1]
-    image, plane = mould_image(mould, pixels), ("y", "x")
-    along = {axis: (axis, pixel_centres(pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
+    plane = ("y", "x")
+    along = {axis: (axis, pixel_centres(cast.pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
     masks = {
-        "depression": (plane, image.depression, named("whether cells may be there")),
-        "tethers": (plane, image.tethers, named("whether a tether stands there")),
+        "depression": (plane, cast.depression, named("whether cells may be there")),
+        "tethers": (plane, cast.tethers, named("whether a tether stands there")),
     }
     values = {name: ((), value, named(PARAMETERS[name])) for name, value in asdict(parameters).items()}
     return xr.Dataset(
         {name: (plane, image, named(LONG_NAMES[name])) for name, image in zip(FIELDS, fields, strict=True)},
         {**along, **masks, **values},
-        {"mould": json.dumps(mould.as_feature()), "frame_size": IMAGE_SIZE, **attributes},
+        {
+            "mould": json.dumps(cast.mould.as_feature()),
+            "frame_size": IMAGE_SIZE,
+            "layers": cast.layers,
+            **attributes,
+        },
     )
 
 

@@ -10,86 +10,50 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from raptor.frame import IMAGE_SIZE, pixel_size
+from raptor.frame import pixel_size
+from raptor.moulds.cast import CastMould, central_section
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import MouldImage, mould_image
 
 SAMPLES_PER_PIXEL = 4  # along a section
 
 
-def density_threshold(layers: int, pixels: int) -> float:
-    """Density per pixel above which there is tissue: 0.2 at 7 layers and 256 pixels (paper)."""
-    return 0.48 * layers * pixel_size(pixels) ** 2
-
-
-def area_ratio(density: NDArray[np.floating], image: MouldImage, threshold: float) -> float:
-    """A/A0: pixels (y, x) of tissue anywhere in the image, over pixels of the depression."""
-    return float(np.count_nonzero(density > threshold) / np.count_nonzero(image.depression))
-
-
-def ratios_above(
-    density: NDArray[np.floating], image: MouldImage, mould: Mould, threshold: float
+def shape_ratios(
+    density: NDArray[np.floating], cast: CastMould, threshold: float | None = None
 ) -> NDArray[np.float64]:
-    """A/A0 and w/w0, (2,), of the tissue where density (y, x) is above a threshold."""
-    return np.array([area_ratio(density, image, threshold), width_ratio(density, mould, threshold)])
+    """A/A0 and w/w0, (2,), of a tissue from its density (y, x) in its mould.
 
-
-def shape_ratios(density: NDArray[np.floating], mould: Mould, layers: int) -> tuple[float, float]:
-    """A/A0 and w/w0 of a tissue of so many layers from its density (y, x) in its mould.
-
-    Raises
-    ------
-    RaptorError
-        Where the depression covers no pixel.
+    Parameters
+    ----------
+    threshold : float or None
+        Density per pixel above which there is tissue; None for `cast.threshold`.
     """
-    pixels = density.shape[-1]
-    area, width = ratios_above(density, mould_image(mould, pixels), mould, density_threshold(layers, pixels))
-    return float(area), float(width)
+    return np.array([area_ratio(density, cast, threshold), width_ratio(density, cast, threshold)])
 
 
-def central_section(mould: Mould) -> shapely.LineString:
-    """The line across the centre of the depression's minimum rotated rectangle, along its short side.
-
-    Where the two sides are equal, the one nearer to x counts as the long one.
-    """
-    return sections(mould, (0.0,))[0]
+def area_ratio(density: NDArray[np.floating], cast: CastMould, threshold: float | None = None) -> float:
+    """A/A0: pixels (y, x) of tissue anywhere in the image, over pixels of the depression."""
+    threshold = cast.threshold if threshold is None else threshold
+    return float(np.count_nonzero(density > threshold) / np.count_nonzero(cast.depression))
 
 
-def sections(mould: Mould, places: Sequence[float]) -> list[shapely.LineString]:
-    """Lines parallel to the central section, at places from -1 to 1 along half of the long side."""
-    centre, half = long_axis(mould)
-    across = np.array([-half[1], half[0]]) / np.hypot(*half)
-    reach = IMAGE_SIZE * across
-    middles = [centre + place * half for place in places]
-    return [shapely.LineString([middle - reach, middle + reach]) for middle in middles]
-
-
-def long_axis(mould: Mould) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centre of the depression's minimum rotated rectangle, and half of its long side, each (2,), l0."""
-    rectangle = shapely.oriented_envelope(mould.outline)
-    corners = shapely.get_coordinates(rectangle)[:4]
-    sides = corners[1:3] - corners[:2]
-    lengths = np.linalg.norm(sides, axis=1)
-    if np.isclose(lengths[0], lengths[1], rtol=1e-6):
-        long = int(np.abs(sides[1, 0]) > np.abs(sides[0, 0]))
-    else:
-        long = int(lengths[1] > lengths[0])
-    return corners.mean(axis=0), sides[long] / 2
-
-
-def width_ratio(density: NDArray[np.floating], mould: Mould, threshold: float) -> float:
+def width_ratio(density: NDArray[np.floating], cast: CastMould, threshold: float | None = None) -> float:
     """w/w0: length of tissue on the central section over length of depression; NaN without any."""
-    return section_ratio(density, mould, threshold, [central_section(mould)])
+    return section_ratio(density, cast, [cast.central_section], threshold)
 
 
 def section_ratio(
-    density: NDArray[np.floating], mould: Mould, threshold: float, lines: Sequence[shapely.LineString]
+    density: NDArray[np.floating],
+    cast: CastMould,
+    lines: Sequence[shapely.LineString],
+    threshold: float | None = None,
 ) -> float:
     """Length of tissue on sections through the image over length of depression; NaN without any.
 
     The ends of the tissue are found by linear interpolation of the density (y, x) between samples.
     """
-    return sum(_tissue_length(density, line, threshold) for line in lines) / _cast_width(lines, mould)
+    threshold = cast.threshold if threshold is None else threshold
+    length = sum(_tissue_length(density, line, threshold) for line in lines)
+    return length / _cast_width(lines, cast.mould)
 
 
 def _tissue_length(density: NDArray[np.floating], section: shapely.LineString, threshold: float) -> float:

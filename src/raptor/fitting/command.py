@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
-from raptor.fields.shape import density_threshold, ratios_above
+from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import Minimum, Residuals, minimise
 from raptor.fitting.outline import Densities, Outline, deviations, outline_measure
 from raptor.fitting.posterior import infer, summarise, survey
@@ -24,8 +24,8 @@ from raptor.fitting.targets import (
     unit_of,
 )
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters
+from raptor.raster import density_threshold
 from raptor.surrogate.inference import Surrogate
 
 STARTS = 128
@@ -97,8 +97,7 @@ def fit_for(request: Request) -> tuple[dict[str, Any], NDArray[np.floating]]:
     """
     found, measure, densities = _search(request)
     density = densities([found.parameters])[0]
-    image = mould_image(request.mould, request.simulator.pixels)
-    area, width = map(float, ratios_above(density, image, request.mould, request.threshold))
+    area, width = map(float, shape_ratios(density, request.simulator.cast(request.mould), request.threshold))
     fitted = {
         "parameters": asdict(found.parameters),
         "area_ratio": area,

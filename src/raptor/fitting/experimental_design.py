@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from raptor.fields.shape import density_threshold
 from raptor.fitting.measurements import CANDIDATES, SEEN, Candidate, seen, thickness_ratio
 from raptor.fitting.posterior import Posterior, moments
 from raptor.fitting.simulator import Simulator
@@ -51,11 +50,11 @@ def simulate_draws(
 ) -> Sampled:
     """Simulate a tissue at draws from its posterior, evenly along it."""
     chosen = posterior.draws(count, simulator.seed) if count else np.empty(0, dtype=int)
-    threshold = density_threshold(simulator.model.layers, simulator.pixels)
+    cast = simulator.cast(mould)
     rows = []
     for number in chosen:
         made = simulator.run(mould, parameters_at(posterior.units[number]))
-        found = seen(simulator.fields(made), mould, threshold)
+        found = seen(simulator.fields(made), cast, cast.threshold)
         row = dict(zip(PARAMETERS, posterior.parameters[number], strict=True))
         row |= dict(zip(SEEN, found, strict=True))
         row |= {f"{name}_predicted": posterior.values[number, k] for k, name in enumerate(SEEN)}

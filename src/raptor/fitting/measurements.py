@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.condor.simulate import Tissue
-from raptor.fields.shape import area_ratio, long_axis, section_ratio, sections, width_ratio
+from raptor.fields.shape import section_ratio, shape_ratios
 from raptor.fitting.targets import RATIOS
-from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
+from raptor.moulds.cast import CastMould
 from raptor.symmetry import FIELDS
 
 STATIONS = (0.25, 0.5, 0.75)  # of half the long side, from the centre
@@ -56,7 +55,7 @@ CANDIDATES = (
 """Every further measurement that is weighed."""
 
 
-def seen(fields: NDArray[np.floating], mould: Mould, threshold: float) -> NDArray[np.float64]:
+def seen(fields: NDArray[np.floating], cast: CastMould, threshold: float) -> NDArray[np.float64]:
     """What the eight fields (8, y, x) of a tissue show of `SEEN`, (8,).
 
     Widths are w/w0 on pairs of sections at `STATIONS` to both sides of the centre. alignment is the mean
@@ -65,13 +64,12 @@ def seen(fields: NDArray[np.floating], mould: Mould, threshold: float) -> NDArra
     """
     density = fields[0]
     sums = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
-    _, half = long_axis(mould)
+    _, half = cast.long_axis
     cosine, sine = half / np.hypot(*half)
     along = (cosine**2 - sine**2) * (sums["sxsx"] - sums["sysy"]) + 4 * cosine * sine * sums["sxsy"]
-    widths = [section_ratio(density, mould, threshold, sections(mould, (-p, p))) for p in STATIONS]
+    widths = [section_ratio(density, cast, cast.sections((-p, p)), threshold) for p in STATIONS]
     means = [value / sums["density"] for value in (along, sums["szsz"], sums["tension"])]
-    area = area_ratio(density, mould_image(mould, density.shape[-1]), threshold)
-    return np.array([area, width_ratio(density, mould, threshold), *widths, *means])
+    return np.array([*shape_ratios(density, cast, threshold), *widths, *means])
 
 
 def thickness_ratio(simulation: Tissue) -> float:

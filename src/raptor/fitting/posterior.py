@@ -24,12 +24,10 @@ from scipy.interpolate import RBFInterpolator
 from scipy.linalg import eigh
 from scipy.stats import chi2, norm, qmc
 
-from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.fitting.measurements import SEEN, seen
 from raptor.fitting.targets import PARAMETERS, Target, as_array, parameters_at, prior_density
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
 from raptor.surrogate.bands import LEVELS
 from raptor.surrogate.inference import Surrogate
@@ -119,14 +117,14 @@ def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey
     """
     units = qmc.Sobol(3, seed=seed).random(points)
     parameters = [parameters_at(unit) for unit in units]
-    image, cells = mould_image(mould, surrogate.pixels), len(cast_sites(mould, surrogate.layers))
+    cast = surrogate.cast(mould)
     level = LEVELS.index(0.95)
-    bands = [surrogate.examine(mould, p).shape_bands.half[level] for p in parameters[:BANDED]]
+    bands = [surrogate.examine(cast, p).shape_bands.half[level] for p in parameters[:BANDED]]
     values = []
     for start in range(0, points, TOGETHER):
         part = parameters[start : start + TOGETHER]
-        fields = surrogate.predict(image.depression, image.tethers, part, cells)
-        values += [seen(each, mould, surrogate.threshold) for each in fields]
+        fields = surrogate.predict(cast.depression, cast.tethers, part, cast.n_cells)
+        values += [seen(each, cast, surrogate.threshold) for each in fields]
     return Survey(units, np.array(values), np.array(bands, dtype=float) / norm.ppf(0.975))
 
 

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.shape import density_threshold, shape_ratios
+from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import minimise
 from raptor.fitting.outline import deviations, outline_measure, outline_of
 from raptor.fitting.targets import PARAMETERS, Target, as_array, surrogate_densities, surrogate_measure
 from raptor.moulds.geometry import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.raster import density_threshold
 from raptor.surrogate.inference import Surrogate
 
 ERROR = 0.25  # l0; of an outline drawn on a photograph, a pixel of the paper's image
@@ -32,14 +33,13 @@ def recover(
 
     `error` of each is the root mean square error over parameters and searches, in parts of their ranges.
     """
-    measure, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
-    target = Target(*shape_ratios(density, mould, surrogate.layers))
+    cast = surrogate.cast(mould)
+    measure, fine = (surrogate_measure(surrogate, cast, averaged=averaged) for averaged in (False, True))
+    target = Target(*map(float, shape_ratios(density, cast)))
     threshold = density_threshold(surrogate.layers, density.shape[-1])
     outline = outline_of(density, threshold)
     coarse, apart = (
-        outline_measure(
-            surrogate_densities(surrogate, mould, averaged=averaged), outline, surrogate.threshold
-        )
+        outline_measure(surrogate_densities(surrogate, cast, averaged=averaged), outline, surrogate.threshold)
         for averaged in (False, True)
     )
     seeds = [seed + number for number in range(1, SEARCHES + 1)]

@@ -16,6 +16,7 @@ from raptor.condor.simulate import Tissue, simulate
 from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import Minimum, Residuals, descend
 from raptor.fitting.targets import Measure, Target
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
@@ -64,15 +65,20 @@ class Simulator:
         """The eight fields (8, y, x) of a simulated tissue."""
         return rasterise(simulation.positions, simulation.orientation, simulation.tension, self.pixels)
 
-    def ratios(self, simulation: Tissue, mould: Mould) -> NDArray[np.float64]:
+    def cast(self, mould: Mould | CastMould) -> CastMould:
+        """A mould as simulated and seen; one that is cast stays as it is."""
+        return CastMould(mould, self.model.layers, self.pixels) if isinstance(mould, Mould) else mould
+
+    def ratios(self, simulation: Tissue, mould: Mould | CastMould) -> NDArray[np.float64]:
         """A/A0 and w/w0 of a simulated tissue, (2,)."""
-        return np.array(shape_ratios(self.fields(simulation)[0], mould, self.model.layers))
+        return shape_ratios(self.fields(simulation)[0], self.cast(mould))
 
     def measure(self, mould: Mould) -> Measure:
         """Area and width ratio of a mould's tissue, simulated with one seed throughout."""
+        cast = self.cast(mould)
 
         def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-            return np.array([self.ratios(self.run(mould, each), mould) for each in parameters])
+            return np.array([self.ratios(self.run(mould, each), cast) for each in parameters])
 
         return measure
 
@@ -103,7 +109,8 @@ def measure_again(
 
     `rss_std` is the standard deviation of the residual sum of squares of single simulations.
     """
-    ratios = np.array([simulator.ratios(simulation, mould) for simulation in simulations])
+    cast = simulator.cast(mould)
+    ratios = np.array([simulator.ratios(simulation, cast) for simulation in simulations])
     mean, deviation = ratios.mean(axis=0), _deviation(ratios)
     single = np.array([target.rss(each) for each in ratios])
     return {

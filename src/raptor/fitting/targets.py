@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.lattice import cast_sites
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
 from raptor.surrogate.inference import Surrogate
 
@@ -80,27 +79,26 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([strip.upper - strip.lower for strip in strips])
 
 
-def surrogate_measure(surrogate: Surrogate, mould: Mould, *, averaged: bool = False) -> Measure:
+def surrogate_measure(surrogate: Surrogate, mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
     """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
-    image = mould_image(mould, surrogate.pixels)
-    densities_of = surrogate_densities(surrogate, mould, averaged=averaged)
+    cast = surrogate.cast(mould)
+    densities_of = surrogate_densities(surrogate, cast, averaged=averaged)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-        return np.array([surrogate.shape(density, image, mould) for density in densities_of(parameters)])
+        return np.array([surrogate.shape(density, cast) for density in densities_of(parameters)])
 
     return measure
 
 
 def surrogate_densities(
-    surrogate: Surrogate, mould: Mould, *, averaged: bool = False
+    surrogate: Surrogate, mould: Mould | CastMould, *, averaged: bool = False
 ) -> Callable[[Sequence[CellParameters]], Any]:
     """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate."""
-    cells = len(cast_sites(mould, surrogate.layers))
-    image = mould_image(mould, surrogate.pixels)
+    cast = surrogate.cast(mould)
 
     def densities(parameters: Sequence[CellParameters]) -> NDArray[np.float32]:
-        fields = surrogate.predict(image.depression, image.tethers, parameters, cells, averaged=averaged)
-        return fields[:, 0]
+        masks = (cast.depression, cast.tethers)
+        return surrogate.predict(*masks, parameters, cast.n_cells, averaged=averaged)[:, 0]
 
     return densities
 

@@ -36,7 +36,8 @@ def fit_tissue(
         Simulations again, with further seeds, at each fit.
     """
     begun = perf_counter()
-    coarse, fine = (surrogate_measure(surrogate, mould, averaged=averaged) for averaged in (False, True))
+    cast = surrogate.cast(mould)
+    coarse, fine = (surrogate_measure(surrogate, cast, averaged=averaged) for averaged in (False, True))
     found = minimise(coarse, target.residuals, starts=starts, seed=simulator.seed, fine=fine)
     fitted = perf_counter()
     measure = simulator.measure(mould)

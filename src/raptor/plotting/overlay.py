@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
-from raptor.fields.shape import central_section
 from raptor.imaging.pictures import Picture
 from raptor.imaging.registration import Registration
 from raptor.imaging.tissue import Measurement
 from raptor.moulds import Mould
+from raptor.moulds.cast import central_section
 from raptor.plotting.drawing import PREDICTED, SIMULATED, STYLED, THIRD, new_figure
 
 MOULD, OUTLINE, SECTION = "#4fb3ff", "#ff3b30", "#ffd60a"  # told apart on grey

@@ -6,12 +6,10 @@ from dataclasses import asdict, replace
 import numpy as np
 import pandas as pd
 
-from raptor.condor.lattice import cast_sites
 from raptor.dataset.design import DesignRules, Run
 from raptor.dataset.further import further_set
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import RandomMoulds
-from raptor.moulds.raster import mould_image
 from raptor.surrogate.bands import relative_spread
 from raptor.surrogate.inference import Surrogate
 
@@ -32,8 +30,7 @@ def enriched(
     runs, moulds = further_set("enriched", candidates, [], {}, rules, drawn, seed)
     disagreements = []
     for run, mould in zip(runs, moulds, strict=True):
-        image, cells = mould_image(mould, surrogate.pixels), len(cast_sites(mould, surrogate.layers))
-        fields, spread, _ = surrogate.ensemble(image, run.parameters, cells)
+        fields, spread, _ = surrogate.ensemble(surrogate.cast(mould), run.parameters)
         disagreements.append(relative_spread(spread, fields))
         on_progress(run.simulation)
     chosen = np.sort(np.argsort(disagreements)[::-1][:size])

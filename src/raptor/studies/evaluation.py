@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
-from raptor.fields.shape import area_ratio, density_threshold, width_ratio
+from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import MouldImage
 from raptor.surrogate.bands import LEVELS
-from raptor.surrogate.baselines import cast_density
 from raptor.surrogate.inference import Prediction, Surrogate
 from raptor.symmetry import FIELDS
 
@@ -38,28 +37,22 @@ REGIONS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
 """Regions of the parameters by which errors are told, each a mask of a table's rows."""
 
 Guess = NDArray[np.floating] | Prediction
-Predictor = Callable[[Sample, Mould], Guess]
+Predictor = Callable[[Sample, CastMould], Guess]
 
 
-def sample_measures(
-    fields: NDArray[np.floating], sample: Sample, mould: Mould, layers: int
-) -> dict[str, float]:
-    """Bulk statistics, A/A0 and w/w0 of fields (8, y, x) on a sample's mould, keyed by `MEASURES`."""
-    threshold = density_threshold(layers, fields.shape[-1])
-    image = MouldImage(sample.depression.astype(bool), sample.tethers.astype(bool))
-    return bulk_statistics(fields, sample.n_cells, threshold) | {
-        "area_ratio": area_ratio(fields[0], image, threshold),
-        "width_ratio": width_ratio(fields[0], mould, threshold),
-    }
+def sample_measures(fields: NDArray[np.floating], cast: CastMould) -> dict[str, float]:
+    """Bulk statistics, A/A0 and w/w0 of fields (8, y, x) of a mould's tissue, keyed by `MEASURES`."""
+    shapes = dict(zip(SHAPES, shape_ratios(fields[0], cast).tolist(), strict=True))
+    return bulk_statistics(fields, cast.n_cells, cast.threshold) | shapes
 
 
 def predictor_of(surrogate: Surrogate) -> Predictor:
     """A surrogate's answer to a sample: with its bands, where it is calibrated."""
 
-    def answer(sample: Sample, mould: Mould) -> Guess:
+    def answer(sample: Sample, cast: CastMould) -> Guess:
         if surrogate.calibration is not None:
-            return surrogate.examine(mould, sample.parameters)
-        return surrogate.predict_mould(mould, sample.parameters)
+            return surrogate.examine(cast, sample.parameters)
+        return surrogate.predict_mould(cast, sample.parameters)
 
     return answer
 
@@ -109,16 +102,15 @@ def evaluate(
     """
     rows = []
     for sample in read_samples(stack, read_table(stack).rows("test")):
-        mould = moulds[sample.mould]
-        guess = predict(sample, mould)
+        cast = CastMould(moulds[sample.mould], layers, sample.fields.shape[-1])
+        guess = predict(sample, cast)
         prediction = guess.fields if isinstance(guess, Prediction) else guess
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
         row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}
         row |= field_errors(prediction, sample.fields, sample)
-        cast = cast_density(mould, layers, prediction.shape[-1])
-        row["vrmse_density_as_cast"] = float(vrmse(cast, sample.fields[0]))
+        row["vrmse_density_as_cast"] = float(vrmse(cast.density, sample.fields[0]))
         for source, fields in (("simulated", sample.fields), ("predicted", prediction)):
-            measured = sample_measures(fields, sample, mould, layers)
+            measured = sample_measures(fields, cast)
             row |= {f"{name}_{source}": value for name, value in measured.items()}
         if isinstance(guess, Prediction):
             row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.shape, strict=True)}
@@ -163,7 +155,8 @@ def noise_floor(stack: Path, further: Path, moulds: Mapping[str, Mould], layers:
         row |= asdict(samples[0].parameters)
         errors = pd.DataFrame(pairs).drop(columns=[f"pearson_{field}" for field in FIELDS]).mean()
         row |= {str(name): float(value) / np.sqrt(2) for name, value in errors.items()}
-        measured = pd.DataFrame([sample_measures(s.fields, s, moulds[mould], layers) for s in samples])
+        cast = CastMould(moulds[mould], layers, samples[0].fields.shape[-1])
+        measured = pd.DataFrame([sample_measures(s.fields, cast) for s in samples])
         row |= {name: float(measured[name].std(ddof=1)) for name in MEASURES}
         rows.append(row)
     return pd.DataFrame(rows)

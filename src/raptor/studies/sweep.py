@@ -15,6 +15,7 @@ from raptor.dataset.shards import Record, read_shard
 from raptor.dataset.stack import record_fields
 from raptor.dataset.sweep import Grid
 from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.surrogate.bands import LEVELS
@@ -57,8 +58,9 @@ def measure(
         As `read_shard`.
     """
     rows = []
+    cast = CastMould(mould, layers, pixels)
     for record in _records(shards, configuration):
-        shape = shape_ratios(record_fields(record, pixels)[0], mould, layers)
+        shape = shape_ratios(record_fields(record, pixels)[0], cast).tolist()
         row: dict[str, Any] = {"simulation": record.simulation, "seed": record.seed}
         row |= dict(zip(POINT, point_of(record.parameters), strict=True))
         row |= dict(zip(SHAPES, shape, strict=True))
@@ -81,9 +83,10 @@ def predict(
     """
     rows = []
     widest = LEVELS.index(0.95)
+    cast = surrogate.cast(mould)
     for parameters in grid.points.values():
         point = point_of(parameters)
-        seen = surrogate.examine(mould, parameters)
+        seen = surrogate.examine(cast, parameters)
         row: dict[str, Any] = dict(zip(POINT, point, strict=True))
         row |= dict(zip(SHAPES, seen.shape.tolist(), strict=True))
         bands = seen.shape_bands.half[widest].tolist()
@@ -186,10 +189,11 @@ def tissues(
         first.setdefault(point_of(run.parameters), run)
     wanted = {first[point].simulation: point for point in points}
     found = {}
+    cast = surrogate.cast(mould)
     for record in _records(shards, configuration):
         if record.simulation in wanted:
             simulated = record_fields(record, surrogate.pixels)
-            predicted = surrogate.predict_mould(mould, record.parameters)
+            predicted = surrogate.predict_mould(cast, record.parameters)
             point = wanted[record.simulation]
             found[point] = Tissue(point, simulated, predicted)
     if not found:

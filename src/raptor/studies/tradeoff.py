@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from raptor.condor.simulate import Tissue, simulate
 from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 from raptor.surrogate.inference import Surrogate
@@ -96,7 +96,7 @@ class Case:
 
     def shape(self, fields: NDArray[np.floating]) -> NDArray[np.float64]:
         """A/A0 and w/w0 of fields (8, y, x), of any raster."""
-        return np.array(shape_ratios(fields[0], self.mould, self.model.layers))
+        return shape_ratios(fields[0], CastMould(self.mould, self.model.layers, fields.shape[-1]))
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def compare(
     rows += _other_rasters(case, reference, comparison.pixels, on_progress)
     if surrogate is not None:
         predicted, seconds = _timed(partial(surrogate.predict_mould, case.mould, case.parameters))
-        shape = surrogate.shape(predicted[0], mould_image(case.mould, case.pixels), case.mould)
+        shape = surrogate.shape(predicted[0], surrogate.cast(case.mould))
         row = _row(case, reference, "surrogate", predicted, seconds)
         row["area_error"], row["width_error"] = reference.shape_error(shape)
         rows.append(row)

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.dataset.examples import Example, transform_sample
 from raptor.dataset.scaling import scale_inputs
 from raptor.dataset.stack import Sample, read_samples, read_table
-from raptor.moulds.geometry import Mould
-from raptor.raster import rasterise
+from raptor.moulds.cast import CastMould
 from raptor.symmetry import Element
 
 COARSE = 16  # pixels of the images by which moulds are compared
@@ -27,12 +25,6 @@ def training_mean(stack: Path, examples: list[Example]) -> NDArray[np.float64]:
     for sample, element in _images(stack, chosen):
         total = total + transform_sample(sample, element).fields
     return np.asarray(total / len(chosen), dtype=np.float64)
-
-
-def cast_density(mould: Mould, layers: int, pixels: int) -> NDArray[np.float64]:
-    """Density (y, x) before any contraction: what a guess of "nothing happens" gives."""
-    sites = cast_sites(mould, layers)
-    return np.asarray(rasterise(sites, np.ones_like(sites), np.zeros(len(sites)), pixels)[0])
 
 
 def training_examples(stack: Path, examples: list[Example]) -> list[Example]:
@@ -76,7 +68,7 @@ class Nearest:
         return transform_sample(found, Element.from_index(example.element)).fields
 
 
-def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sample, Mould], NDArray[Any]]:
+def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sample, CastMould], NDArray[Any]]:
     """One of `BASELINES`, as a function from a sample's inputs to fields (8, y, x).
 
     Raises
@@ -86,10 +78,10 @@ def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sampl
     """
     if name == "nearest":
         nearest = Nearest(stack, examples)
-        return lambda sample, mould: nearest.fields(sample)
+        return lambda sample, cast: nearest.fields(sample)
     if name == "mean":
         mean = training_mean(stack, examples)
-        return lambda sample, mould: mean
+        return lambda sample, cast: mean
     raise RaptorError(f"there is no baseline '{name}'; known are {', '.join(BASELINES)}")
 
 

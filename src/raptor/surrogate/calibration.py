@@ -11,9 +11,10 @@ from scipy.optimize import minimize_scalar
 from raptor.core.errors import RaptorError
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.metrics import without_sign
-from raptor.fields.shape import density_threshold, ratios_above
+from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import MouldImage
+from raptor.raster import density_threshold
 from raptor.surrogate.bands import USUAL, Calibration, fit_scale, relative_spread
 from raptor.surrogate.inference import Surrogate, deviation
 from raptor.surrogate.out_of_distribution import Novelty, descriptors
@@ -46,19 +47,18 @@ def calibrate(
     seen: list[Silhouette] = []
     disagreements, distances = [], []
     for sample in read_samples(stack, rows):
-        mould = moulds[sample.mould]
-        image = MouldImage(sample.depression.astype(bool), sample.tethers.astype(bool))
-        predicted, spread, of_members = surrogate.ensemble(image, sample.parameters, sample.n_cells)
+        cast = surrogate.cast(moulds[sample.mould])
+        predicted, spread, of_members = surrogate.ensemble(cast, sample.parameters)
         rng = np.random.default_rng([seed, sample.simulation])
-        inside = np.flatnonzero(image.depression)
+        inside = np.flatnonzero(cast.depression)
         chosen = rng.choice(inside, PIXELS, replace=len(inside) < PIXELS)
         error, wide, size = (
             part.reshape(len(part), -1)[:, chosen].T
             for part in (without_sign(predicted) - without_sign(sample.fields), spread, np.abs(predicted[:1]))
         )
         fields.append(np.stack([error, wide, np.broadcast_to(size, error.shape)]))
-        true = ratios_above(sample.fields[0], image, mould, threshold)
-        seen.append(Silhouette(image, mould, true, predicted[0], of_members))
+        true = shape_ratios(sample.fields[0], cast)
+        seen.append(Silhouette(cast, true, predicted[0], of_members))
         disagreements.append(relative_spread(spread, predicted))
         distances.append(novelty.distance(_descriptors(sample)))
         on_progress(sample.simulation)
@@ -77,19 +77,18 @@ def calibrate(
 class Silhouette:
     """A tissue's true ratios (2,), and densities predicted by all networks (y, x) and by each (n, y, x)."""
 
-    image: MouldImage
-    mould: Mould
+    cast: CastMould
     true: NDArray[np.float64]
     predicted: NDArray[np.float32]
     of_members: NDArray[np.float32]
 
     def error(self, threshold: float) -> NDArray[np.float64]:
         """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
-        return ratios_above(self.predicted, self.image, self.mould, threshold) - self.true
+        return shape_ratios(self.predicted, self.cast, threshold) - self.true
 
     def errors(self, threshold: float) -> NDArray[np.float64]:
         """Errors, spread over networks and sizes of both ratios, (3, 2)."""
-        of_each = [ratios_above(d, self.image, self.mould, threshold) for d in self.of_members]
+        of_each = [shape_ratios(d, self.cast, threshold) for d in self.of_members]
         return np.stack([self.error(threshold), deviation(np.array(of_each)), np.ones(2)])
 
 

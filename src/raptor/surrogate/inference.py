@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import interpolate
 
-from raptor.condor.lattice import cast_sites
 from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.fields.resample import pooled, refined
-from raptor.fields.shape import density_threshold, ratios_above
+from raptor.fields.shape import shape_ratios
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import MouldImage, mould_image
 from raptor.parameters import CellParameters
+from raptor.raster import density_threshold
 from raptor.surrogate.bands import Bands, Calibration
 from raptor.surrogate.constraints import average, project, signed, unsigned
 from raptor.surrogate.networks import Architecture, Generator
@@ -128,7 +128,7 @@ class Surrogate:
         return fine
 
     def predict_mould(
-        self, mould: Mould, parameters: CellParameters, *, averaged: bool = True
+        self, mould: Mould | CastMould, parameters: CellParameters, *, averaged: bool = True
     ) -> NDArray[np.float32]:
         """Fields (8, y, x) of a mould at one set of parameters.
 
@@ -137,12 +137,11 @@ class Surrogate:
         RaptorError
             As `predict`, and where the mould holds no cell.
         """
-        image = mould_image(mould, self.pixels)
-        cells = len(cast_sites(mould, self.layers))
-        fields = self.predict(image.depression, image.tethers, [parameters], cells, averaged=averaged)
+        cast = self.cast(mould)
+        fields = self.predict(cast.depression, cast.tethers, [parameters], cast.n_cells, averaged=averaged)
         return np.asarray(fields[0])
 
-    def examine(self, mould: Mould, parameters: CellParameters) -> Prediction:
+    def examine(self, mould: Mould | CastMould, parameters: CellParameters) -> Prediction:
         """Predict a mould's tissue with its calibrated bands, and say whether it is unlike the training set.
 
         Raises
@@ -155,14 +154,14 @@ class Surrogate:
                 "this model's errors were not calibrated, so it cannot say how far to trust a prediction; "
                 "use the model that the workflow's rule assemble_model wrote"
             )
-        image, cells = mould_image(mould, self.pixels), len(cast_sites(mould, self.layers))
-        fields, spread, of_members = self.ensemble(image, parameters, cells)
-        shapes = np.array([self.shape(density, image, mould) for density in of_members])
+        cast = self.cast(mould)
+        fields, spread, of_members = self.ensemble(cast, parameters)
+        shapes = np.array([self.shape(density, cast) for density in of_members])
         calibration = self.calibration
-        seen = descriptors(image.depression, image.tethers, parameters)
+        seen = descriptors(cast.depression, cast.tethers, parameters)
         return Prediction(
             fields,
-            self.shape(fields[0], image, mould),
+            self.shape(fields[0], cast),
             calibration.fields.bands(spread, np.abs(fields[:1])),
             calibration.shapes.bands(deviation(shapes), np.ones(2)),
             calibration.disagreement_of(spread, fields),
@@ -171,21 +170,25 @@ class Surrogate:
         )
 
     def ensemble(
-        self, image: MouldImage, parameters: CellParameters, cells: int
+        self, cast: CastMould, parameters: CellParameters
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
         """Mean fields (8, y, x), their spread over members and images, and members' densities (n, y, x)."""
-        masks = self._masks(image.depression, image.tethers, [parameters])
-        images = self._images(masks, [parameters], cells, averaged=True)[0]
+        masks = self._masks(cast.depression, cast.tethers, [parameters])
+        images = self._images(masks, [parameters], cast.n_cells, averaged=True)[0]
         of_members = images.reshape(len(self.members), -1, *images.shape[1:])
         means = torch.cat([_means(images[None]), _means(of_members)])
-        fine = self._fine(means, masks, cells).numpy()
+        fine = self._fine(means, masks, cast.n_cells).numpy()
         spread = unsigned(images).std(dim=0, correction=1)
         wide = interpolate(spread[None], size=2 * (self.pixels,), mode="bilinear")[0].numpy()
         return fine[0], wide, fine[1:, 0]
 
-    def shape(self, density: NDArray[np.floating], image: MouldImage, mould: Mould) -> NDArray[np.float64]:
+    def cast(self, mould: Mould | CastMould) -> CastMould:
+        """A mould with as many layers and pixels as the networks know; one that is cast stays as it is."""
+        return CastMould(mould, self.layers, self.pixels) if isinstance(mould, Mould) else mould
+
+    def shape(self, density: NDArray[np.floating], cast: CastMould) -> NDArray[np.float64]:
         """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
-        return ratios_above(density, image, mould, self.threshold)
+        return shape_ratios(density, cast, self.threshold)
 
     def _masks(
         self, depression: NDArray[Any], tethers: NDArray[Any], parameters: Sequence[CellParameters]

@@ -16,8 +16,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from raptor.condor.lattice import HALF_SPAN, cast_sites, shell_offsets, site_numbers
+from raptor.condor.lattice import shell_offsets, site_numbers
 from raptor.condor.walls import Walls, build_walls
+from raptor.moulds.cast import HALF_SPAN, cast_sites
 from raptor.moulds.geometry import Mould
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 

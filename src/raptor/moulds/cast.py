@@ -1,0 +1,148 @@
+"""A mould cast with a number of layers and seen on an image: what follows from its geometry, solved once.
+
+A prediction, an evaluation, a fit or a check makes one `CastMould` of its mould and hands it on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from raptor.core.errors import RaptorError
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.geometry import STRICTLY, Mould
+from raptor.moulds.raster import MouldImage, mould_image
+from raptor.raster import density_image, density_threshold
+
+HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond
+
+
+@dataclass(frozen=True)
+class CastMould:
+    """A mould, its lattice of so many layers, and both as images; each solved when it is first asked for.
+
+    Parameters
+    ----------
+    mould : Mould
+    layers : int
+        Of the lattice.
+    pixels : int
+        Along a side of the images.
+    """
+
+    mould: Mould
+    layers: int
+    pixels: int
+
+    @cached_property
+    def image(self) -> MouldImage:
+        """Masks (y, x) of depression and tethers; raises a RaptorError where `mould_image` does."""
+        return mould_image(self.mould, self.pixels)
+
+    @property
+    def depression(self) -> NDArray[np.bool_]:
+        """Pixels (y, x) where cells may be."""
+        return self.image.depression
+
+    @property
+    def tethers(self) -> NDArray[np.bool_]:
+        """Pixels (y, x) where tethers stand."""
+        return self.image.tethers
+
+    @cached_property
+    def sites(self) -> NDArray[np.float64]:
+        """Sites (cells, 3), l0; raises a RaptorError where `cast_sites` does."""
+        return cast_sites(self.mould, self.layers)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return len(self.sites)
+
+    @cached_property
+    def density(self) -> NDArray[np.float64]:
+        """Density per pixel (y, x) of the tissue as cast, before it contracts."""
+        return density_image(self.sites, self.pixels)
+
+    @property
+    def threshold(self) -> float:
+        """Density per pixel above which there is tissue."""
+        return density_threshold(self.layers, self.pixels)
+
+    @cached_property
+    def long_axis(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Centre and half of the long side, each (2,), l0: see `long_axis`."""
+        return long_axis(self.mould)
+
+    @cached_property
+    def central_section(self) -> shapely.LineString:
+        """The line on which w/w0 is measured."""
+        return self.sections((0.0,))[0]
+
+    def sections(self, places: Sequence[float]) -> list[shapely.LineString]:
+        """Lines parallel to the central section, at places from -1 to 1 along half of the long side."""
+        centre, half = self.long_axis
+        return [_across(centre + place * half, half) for place in places]
+
+
+def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
+    """Sites (cells, 3) strictly inside a mould's depression, l0, by layer, then y, then x.
+
+    Layer k lies at z = (k + 1/2) / sqrt 2; even layers have sites at integer x and y, odd layers at
+    half-integer x and y, so that the point set has the full square symmetry about the image centre.
+
+    Raises
+    ------
+    RaptorError
+        Where there is none.
+    """
+    planes = [_plane(mould, 0.5 * parity) for parity in range(min(layers, 2))]
+    heights = (np.arange(layers) + 0.5) / np.sqrt(2)
+    parts = [
+        np.column_stack([planes[layer % 2], np.full(len(planes[layer % 2]), height)])
+        for layer, height in enumerate(heights)
+    ]
+    sites = np.concatenate(parts)
+    if len(sites) == 0:
+        raise RaptorError(
+            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites stand "
+            "1 l0 apart, so draw it larger"
+        )
+    return sites
+
+
+def central_section(mould: Mould) -> shapely.LineString:
+    """The line across the centre of the outline's minimum rotated rectangle, along its short side.
+
+    Where the two sides are equal, the one nearer to x counts as the long one.
+    """
+    return _across(*long_axis(mould))
+
+
+def long_axis(mould: Mould) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre of the outline's minimum rotated rectangle, and half of its long side, each (2,), l0."""
+    rectangle = shapely.oriented_envelope(mould.outline)
+    corners = shapely.get_coordinates(rectangle)[:4]
+    sides = corners[1:3] - corners[:2]
+    lengths = np.linalg.norm(sides, axis=1)
+    if np.isclose(lengths[0], lengths[1], rtol=1e-6):
+        long = int(np.abs(sides[1, 0]) > np.abs(sides[0, 0]))
+    else:
+        long = int(lengths[1] > lengths[0])
+    return corners.mean(axis=0), sides[long] / 2
+
+
+def _plane(mould: Mould, shift: float) -> NDArray[np.float64]:
+    """Sites (n, 2) of one layer, l0, by y, then x."""
+    axis = np.arange(-HALF_SPAN, HALF_SPAN + 1) + shift
+    points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    return points[mould.forbidden_depth(points) < -STRICTLY]
+
+
+def _across(middle: NDArray[np.float64], half: NDArray[np.float64]) -> shapely.LineString:
+    """The line through a point across an axis, as long as the image is wide to both sides."""
+    reach = IMAGE_SIZE * np.array([-half[1], half[0]]) / np.hypot(*half)
+    return shapely.LineString([middle - reach, middle + reach])

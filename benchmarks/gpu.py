@@ -26,6 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.kernels import OPERATIONS
+from benchmarks.training import examples_a_second, published
 from raptor.condor.gpu.contract import BatchSolver, Task, room_for_cells
 from raptor.condor.gpu.energy import objective
 from raptor.condor.gpu.layout import BLOCK, build_batch, cast
@@ -40,8 +41,8 @@ from raptor.fields.metrics import vrmse
 from raptor.moulds.geometry import Mould
 from raptor.parameters import NetworkModel
 from raptor.raster import rasterise
-from raptor.surrogate.networks import Architecture, Generator
-from raptor.surrogate.training import TrainingRules, samples_a_second
+from raptor.surrogate.generator import Generator
+from raptor.surrogate.rules import Architecture, TrainingRules
 from raptor.symmetry import FIELDS
 
 CONSOLE = Console(width=110)
@@ -251,15 +252,14 @@ def main(
     found["limits"] = limits(at)
     found["agreement"] = asdict(agreement([tasks[n] for n in some], singles, model, pixels, at))
     found["design"] = asdict(time_design(tasks, of, cast_seconds, model, pixels, at))
-    architecture = Architecture(pixels, channels)
-    training = TrainingRules(1, batch_size, 2e-4, 0.5, 100.0, 0, torch.get_num_threads(), device=where)
-    if where == "cuda":
-        training = replace(training, precision="bfloat16", compiled=True, deterministic=False)
+    architecture = published(pixels, channels)
+    precision = "bfloat16" if where == "cuda" else "float32"
+    training = TrainingRules(batch_size=batch_size, adversarial=1.0, precision=precision)
     bonds, bonds_a_cell = gradient_rate(tasks, model, at)
     found["rates"] = {
         "bonds": bonds,
         "bonds_a_cell": bonds_a_cell,
-        "training": samples_a_second(architecture, training, 20 if where == "cuda" else 2),
+        "training": examples_a_second(architecture, training, where, 20 if where == "cuda" else 2),
         "prediction": prediction_seconds(architecture, at, batch_size),
     }
     with atomic_path(output) as temporary:

@@ -18,15 +18,14 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from torch.utils.data import DataLoader
 
+from benchmarks.training import examples_a_second, published
 from raptor.core.device import chosen_device
 from raptor.dataset.examples import read_examples
-from raptor.dataset.loader import ExampleSet
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples, read_table
-from raptor.surrogate.networks import Architecture
-from raptor.surrogate.training import TrainingRules, samples_a_second
+from raptor.surrogate.batches import ExampleSet
+from raptor.surrogate.rules import TrainingRules
 
 CONSOLE = Console(width=110)
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -87,13 +86,13 @@ def _store(name: str, fields: NDArray[np.float32], path: Path, options: dict[str
     return Stored(name, path.stat().st_size / n, write / n, seconds / n, float(error))
 
 
-def loading_rate(dataset: ExampleSet, batch_size: int, workers: int) -> float:
-    """Examples a second that the loader gives, the workers' start left out."""
-    batches = iter(DataLoader(dataset, batch_size, shuffle=True, num_workers=workers))
-    next(batches)
+def reading_rate(dataset: ExampleSet, batch_size: int) -> float:
+    """Examples a second that are read from the stack, in a random order."""
+    order = torch.randperm(len(dataset)).tolist()
     started = time.perf_counter()
-    examples = sum(len(inputs) for inputs, _ in batches)
-    return examples / (time.perf_counter() - started)
+    for _ in dataset.batches(order, batch_size, torch.device("cpu")):
+        pass
+    return len(dataset) / (time.perf_counter() - started)
 
 
 def main(
@@ -101,9 +100,8 @@ def main(
     samples: Annotated[int, typer.Option(min=8, help="samples to store and to load")] = 128,
     channels: Annotated[int, typer.Option(min=1, help="base channels of the network that is trained")] = 64,
     batch_size: Annotated[int, typer.Option(min=2)] = 4,
-    workers: Annotated[str, typer.Option(help="numbers of loading processes to try")] = "0,1,2",
 ) -> None:
-    """Storage of a data set's fields, the rate of its loader, and the appetite of training, in one run."""
+    """Storage of a data set's fields, the rate of reading, and the appetite of training, in one run."""
     stack = folder / "dataset" / "fields.nc"
     pixels = read_table(stack).pixels
     rows = range(min(samples, len(read_table(stack).split)))
@@ -123,11 +121,10 @@ def main(
     table = Table(title=f"One epoch of {len(examples)} examples, batches of {batch_size}")
     for head in ("what", "samples/s"):
         table.add_column(head, justify="right")
-    for count in map(int, workers.split(",")):
-        table.add_row(f"loader, {count} workers", f"{loading_rate(dataset, batch_size, count):.0f}")
+    table.add_row("reading examples", f"{reading_rate(dataset, batch_size):.0f}")
     device, threads = chosen_device("auto"), torch.get_num_threads()
-    rules = TrainingRules(1, batch_size, 2e-4, 0.5, 100.0, 0, threads, device=device)
-    rate = samples_a_second(Architecture(pixels, channels, 0.5, 3), rules)
+    rules = TrainingRules(batch_size=batch_size, adversarial=1.0, threads=threads)
+    rate = examples_a_second(published(pixels, channels), rules, device)
     place = "GPU" if device == "cuda" else f"{threads} threads"
     table.add_row(f"training, {channels} base channels, {place}", f"{rate:.1f}")
     CONSOLE.print(table)

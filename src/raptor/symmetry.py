@@ -3,19 +3,13 @@
 Element = mirror x -> -x first where `mirror`, then counter-clockwise quarter turns.
 """
 
-import sys
 from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # what needs no tensors does not wait for torch
-    from torch import Tensor
-
-Image = TypeVar("Image", NDArray[Any], "Tensor")
+from raptor.core.arrays import Array, library_of
 
 FIELDS = ("density", "tension", "sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz")
 """The eight output channels, in order."""
@@ -96,18 +90,18 @@ class Element:
         return list(zip(source.tolist(), self.channel_matrix[np.arange(8), source].tolist(), strict=True))
 
 
-def move_pixels(image: Image, element: Element) -> Image:
+def move_pixels(image: Array, element: Element) -> Array:
     """Move the pixels of a square image (..., y, x), rows ascending in y; values unchanged.
 
     numpy arrays and torch tensors alike.
     """
-    arrays = _library(image)
+    arrays = library_of(image)
     moved = arrays.flip(image, (-1,)) if element.mirror else image
     # rot90 turns rows that descend in y counter-clockwise; ours ascend, hence the sign.
     return arrays.rot90(moved, -element.quarter_turns, (-2, -1))  # type: ignore[no-any-return]
 
 
-def apply(fields: Image, element: Element) -> Image:
+def apply(fields: Array, element: Element) -> Array:
     """Transform a field stack (..., 8, y, x) in the order `FIELDS` as tensors of order 0, 1 and 2.
 
     numpy arrays and torch tensors alike. Scaled stacks transform alike, since the scaling commutes with
@@ -115,9 +109,4 @@ def apply(fields: Image, element: Element) -> Image:
     """
     moved = move_pixels(fields, element)
     images = [sign * moved[..., channel, :, :] for channel, sign in element.permutation]
-    return _library(fields).stack(images, -3)  # type: ignore[no-any-return]
-
-
-def _library(array: Any) -> ModuleType:
-    """The library that an array is of, numpy or torch: they name what is used here alike."""
-    return sys.modules[type(array).__module__.partition(".")[0]]
+    return library_of(fields).stack(images, -3)  # type: ignore[no-any-return]

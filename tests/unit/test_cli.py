@@ -202,19 +202,23 @@ def test_a_failed_writer_leaves_what_was_there(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def untrained(folder):
-    """A calibrated surrogate that has learnt nothing."""
+def untrained(folder, *, calibrated=True):
+    """A surrogate that has learnt nothing."""
     from raptor.dataset.scaling import Scaling
     from raptor.surrogate.bands import Calibration, Scale
     from raptor.surrogate.files import save
-    from raptor.surrogate.networks import Architecture, Generator, initialise
+    from raptor.surrogate.generator import Generator
+    from raptor.surrogate.inference import Surrogate
     from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty
+    from raptor.surrogate.rules import Architecture
 
-    architecture, scaling = Architecture(32, 4), Scaling((0.5,) * 8, (0.5,) * 8)
-    weights = [initialise(Generator(architecture, scaling)).state_dict() for _ in range(2)]
+    architecture = Architecture(network="pix2pix", pixels=32, base_channels=4)
+    scaling = Scaling((0.5,) * 8, (0.5,) * 8)
     scales = [Scale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 2)]
     novelty = Novelty(np.random.default_rng(0).normal(size=(9, len(DESCRIPTORS))).astype(np.float32), 1e-3)
-    save(folder, weights, architecture, scaling, 4, 32, {}, "x", Calibration(*scales, 0.1, novelty))
+    members = tuple(Generator(architecture, scaling) for _ in range(2))
+    calibration = Calibration(*scales, 0.1, novelty) if calibrated else None
+    save(folder, Surrogate(members, architecture, scaling, 4, 32, calibration), {}, "x")
     return folder
 
 
@@ -286,23 +290,12 @@ def test_bad_input_to_fit(arguments, message, tmp_path):
 
 
 def test_predict_writes_fields_that_check_takes(tmp_path):
-    from raptor.dataset.scaling import Scaling
-    from raptor.surrogate.bands import Calibration, Scale
-    from raptor.surrogate.files import save
-    from raptor.surrogate.networks import Architecture, Generator, initialise
-    from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty
-
-    architecture = Architecture(32, 4)
-    scaling = Scaling((0.5,) * 8, (0.5,) * 8)
-    weights = [initialise(Generator(architecture, scaling)).state_dict() for _ in range(2)]
-    save(tmp_path, weights, architecture, scaling, 4, 32, {}, "x")
+    untrained(tmp_path, calibrated=False)
     output = tmp_path / "prediction.nc"
     done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
     assert done.returncode == 1
     assert "not calibrated" in done.stderr
-    scales = [Scale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 2)]
-    novelty = Novelty(np.random.default_rng(0).normal(size=(9, len(DESCRIPTORS))).astype(np.float32), 1e-3)
-    save(tmp_path, weights, architecture, scaling, 4, 32, {}, "x", Calibration(*scales, 0.1, novelty))
+    untrained(tmp_path)
     done = raptor("predict", MOULD, *options(), "--model", tmp_path, "--output", output)
     assert done.returncode == 0, done.stderr
     assert "A/A0" in done.stdout

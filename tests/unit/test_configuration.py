@@ -60,9 +60,9 @@ def test_a_fingerprint_changes_with_what_it_depends_on_alone():
         assert plain.fingerprint(stage) == cores.fingerprint(stage)
     for further in plain.further_sets:
         assert plain.further_fingerprint(further) == cores.further_fingerprint(further)
-    more = Configuration.model_validate({"surrogate": {"members": 5, "workers": 2}})
+    more = Configuration.model_validate({"surrogate": {"ensemble_size": 5}})
     longer = Configuration.model_validate({"surrogate": {"epochs": 5}})
-    for model in ("compact", "pix2pix"):
+    for model in ("film_unet", "pix2pix"):
         assert plain.model_fingerprint(model) == more.model_fingerprint(model)
         assert plain.model_fingerprint(model) != longer.model_fingerprint(model)
     assert plain.fingerprint("simulation") == pixels.fingerprint("simulation")
@@ -72,16 +72,16 @@ def test_a_fingerprint_changes_with_what_it_depends_on_alone():
 def test_a_compared_model_is_the_surrogate_but_for_its_keys():
     compared = {"other": {"network": "fno", "epochs": 3}}
     config = Configuration.model_validate(
-        {"surrogate": {"members": 4, "batch_size": 7}, "compared": compared}
+        {"surrogate": {"ensemble_size": 4, "batch_size": 7}, "compared": compared}
     )
-    assert list(config.models) == ["compact", "other"]
+    assert list(config.models) == ["film_unet", "other"]
     other = config.models["other"]
-    assert (other.network, other.epochs, other.batch_size, other.members) == ("fno", 3, 7, 1)
+    assert (other.network, other.epochs, other.batch_size, other.ensemble_size) == ("fno", 3, 7, 1)
     for changes, message in (
-        ({"compact": {}}, "has the name of surrogate.model"),
+        ({"film_unet": {}}, "has the name of surrogate.model"),
         ({"other": {"epoch": 3}}, "has the key 'epoch'"),
         ({"other": {"epochs": 0}}, "greater than or equal to 1"),
-        ({"other": {"pixels": 256}}, "more than fields.pixels"),
+        ({"other": {"pixels": 100}}, "Input should be 16, 32, 64, 128"),
     ):
         with pytest.raises(ValidationError, match=message):
             Configuration.model_validate({"compared": changes})
@@ -89,22 +89,28 @@ def test_a_compared_model_is_the_surrogate_but_for_its_keys():
 
 def test_a_model_continues_one_that_is_listed_before_it_and_like_it():
     config = Configuration.model_validate(
-        {"compared": {"on": {"continues": "compact"}, "further": {"continues": "on"}}, "chosen": "on"}
+        {
+            "compared": {"on": {"initial_weights": "film_unet"}, "further": {"initial_weights": "on"}},
+            "chosen": "on",
+        }
     )
-    assert (config.surrogate.model, config.chosen_model) == ("compact", "on")
+    assert (config.surrogate.model, config.chosen_model) == ("film_unet", "on")
     longer = config.model_copy(update={"surrogate": config.surrogate.model_copy(update={"epochs": 9})})
     changed = Configuration.model_validate(longer.model_dump())
     assert all(config.model_fingerprint(n) != changed.model_fingerprint(n) for n in config.models)
     for compared, message in (
-        ({"on": {"continues": "off"}}, "no model listed before it; allowed are compact"),
-        ({"on": {"continues": "later"}, "later": {}}, "no model listed before it; allowed are compact"),
-        ({"on": {"continues": "compact", "base_channels": 3}}, "on.base_channels differs from"),
-        ({"on": {"continues": "compact", "members": 3}}, "on.members is 3; compact"),
-        ({"gan": {"network": "pix2pix"}, "on": {"network": "pix2pix", "continues": "gan"}}, "adversarial: 0"),
+        ({"on": {"initial_weights": "off"}}, "no model listed before it; allowed are film_unet"),
+        (
+            {"on": {"initial_weights": "later"}, "later": {}},
+            "no model listed before it; allowed are film_unet",
+        ),
+        ({"on": {"initial_weights": "film_unet", "base_channels": 3}}, "on.base_channels differs from"),
+        ({"on": {"initial_weights": "film_unet", "ensemble_size": 3}}, "on.ensemble_size is 3; film_unet"),
+        ({"on": {"initial_weights": "film_unet", "adversarial": 1.0}}, "adversarial: 0"),
     ):
         with pytest.raises(ValidationError, match=message):
             Configuration.model_validate({"compared": compared})
-    with pytest.raises(ValidationError, match="chosen is 'none'; allowed are compact, pix2pix"):
+    with pytest.raises(ValidationError, match="chosen is 'none'; allowed are film_unet, pix2pix"):
         Configuration.model_validate({"chosen": "none"})
 
 

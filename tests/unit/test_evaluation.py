@@ -13,7 +13,6 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run, read_design, write_design
 from raptor.dataset.examples import augment, training_scaling, transform_sample, with_further
 from raptor.dataset.further import CORNER, further_set
-from raptor.dataset.loader import ExampleSet
 from raptor.dataset.run import simulate_shard
 from raptor.dataset.shards import write_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
@@ -26,12 +25,14 @@ from raptor.studies.active_learning import enriched
 from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
 from raptor.surrogate.bands import LEVELS, Bands, fit_scale
 from raptor.surrogate.baselines import Nearest, baseline, training_mean
+from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.calibration import Silhouette, calibrate, fit_edge
 from raptor.surrogate.costs import costs_of
 from raptor.surrogate.files import load, save, write_prediction
+from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
-from raptor.surrogate.networks import Architecture, Generator
 from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty, descriptors
+from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS, Element
 from tests.small import CONFIG, MODEL
 
@@ -50,7 +51,7 @@ def moulds(made):
 def surrogate(stack, moulds):
     """Two untrained networks, calibrated."""
     torch.manual_seed(0)
-    architecture, scaling = Architecture(32, 4, network="compact"), training_scaling(stack)
+    architecture, scaling = Architecture(pixels=32, base_channels=4), training_scaling(stack)
     members = tuple(Generator(architecture, scaling).eval() for _ in range(2))
     plain = Surrogate(members, architecture, scaling, MODEL.layers, 32)
     return replace(plain, calibration=calibrate(plain, stack, moulds, 0))
@@ -129,9 +130,7 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
     assert np.allclose(prediction.fields, surrogate.predict_mould(mould, sample.parameters), atol=1e-5)
     for half in (False, True):
         folder = tmp_path / f"{half}"
-        states = [member.state_dict() for member in surrogate.members]
-        content = ({"training": {"threads": 1}}, "id", surrogate.calibration)
-        save(folder, states, surrogate.architecture, surrogate.scaling, 2, 32, *content, half=half)
+        save(folder, surrogate, {"training": {"threads": 1}}, "id", half=half)
         again = load(folder).examine(mould, sample.parameters)
         near = 5e-3 if half else 1e-6
         assert np.abs(again.fields - prediction.fields).max() < near * np.abs(prediction.fields).max()

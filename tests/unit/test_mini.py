@@ -6,22 +6,20 @@ import sys
 
 import numpy as np
 import pytest
-import torch
 import yaml
-from torch.utils.data import DataLoader
 
 from raptor.condor.simulate import simulate
 from raptor.core.errors import RaptorError
 from raptor.dataset.check import check
 from raptor.dataset.design import read_design
 from raptor.dataset.examples import read_examples
-from raptor.dataset.loader import ExampleSet
 from raptor.dataset.provenance import trace_example, trace_simulation
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples
 from raptor.moulds import moulds_by_id
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
+from raptor.surrogate.batches import ExampleSet
 from raptor.symmetry import Element, apply
 from tests.small import MINI, ROOT
 
@@ -85,14 +83,6 @@ def examples():
     return ExampleSet(folder / "fields.nc", chosen, read_scaling(folder / "normalisation.json"))
 
 
-def test_workers_give_the_same_batches_after_the_parent_has_read(examples):
-    """HDF5 breaks where a forked process goes on with its parent's file."""
-    alone = list(DataLoader(examples, 5))
-    shared = list(DataLoader(examples, 5, num_workers=2))
-    for ours, theirs in zip(alone, shared, strict=True):
-        assert all(torch.equal(a, b) for a, b in zip(ours, theirs, strict=True))
-
-
 def test_an_example_is_its_sample_moved_and_scaled(examples):
     for number in (0, 5, 11):
         example = examples.examples[number]
@@ -115,5 +105,5 @@ def test_the_storage_benchmark_prints_its_tables():
     command = [sys.executable, "-m", "benchmarks.storage", str(MINI), "--samples", "8"]
     done = subprocess.run([*command, "--channels", "2"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    for text in ("zstd 9", "zlib 1, 15 bits", "loader, 2 workers", "training, 2 base channels"):
+    for text in ("zstd 9", "zlib 1, 15 bits", "reading examples", "training, 2 base channels"):
         assert text in done.stdout

@@ -82,10 +82,10 @@ def test_every_file_says_what_it_is(results):
 
 
 def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
-    weights = load_file(results / "surrogate" / "compact" / "weights.safetensors")
+    weights = load_file(results / "surrogate" / "film_unet" / "weights.safetensors")
     assert all(np.isfinite(value).all() for value in weights.values())
     assert {name.split(".")[0] for name in weights} == {"0", "1", "novelty"}
-    history = pd.read_csv(results / "surrogate" / "compact" / "training.csv")
+    history = pd.read_csv(results / "surrogate" / "film_unet" / "training.csv")
     assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
     enriched = pd.read_csv(results / "surrogate" / "enriched" / "training.csv")
@@ -93,7 +93,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert enriched["distance"].tolist()[:2] == history["distance"].tolist()[:2]
     candidates = pd.read_csv(results / "further" / "enriched" / "candidates.csv")
     assert candidates["chosen"].sum() == 2
-    metrics = json.loads((results / "evaluation" / "compact" / "metrics.json").read_text())
+    metrics = json.loads((results / "evaluation" / "film_unet" / "metrics.json").read_text())
     assert set(metrics) == {"test", "corner"}
     assert metrics["test"]["samples"] == 2
     assert set(metrics["test"]["bulk"]) == {
@@ -104,10 +104,10 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert floor["runs"].tolist() == [3]
     assert (floor["vrmse_density"] > 0).all()
     models = pd.read_csv(results / "evaluation" / "models.csv").set_index("model")
-    assert models.index.tolist() == ["compact", "pix2pix", "enriched", "nearest", "mean"]
-    assert (models.loc[["compact", "pix2pix"], "training_core_minutes"] > 0).all()
+    assert models.index.tolist() == ["film_unet", "pix2pix", "enriched", "nearest", "mean"]
+    assert (models.loc[["film_unet", "pix2pix"], "training_core_minutes"] > 0).all()
     assert models["density_in_floors"].notna().all()
-    regions = pd.read_csv(results / "evaluation" / "compact" / "regions.csv").set_index("region")
+    regions = pd.read_csv(results / "evaluation" / "film_unet" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
     assert regions.loc["further: corner", "samples"] == 2
     card = (results / "shipped" / "card.md").read_text()
@@ -203,7 +203,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     """SIGKILL to everything, twice: among simulations and in training."""
     place = workplace("killed")
     folder = place.folder / "results" / "tiny"
-    for seen in ("simulations/00000-00002.nc", "surrogate/compact/members/0/checkpoint.pt"):
+    for seen in ("simulations/00000-00002.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
         run = subprocess.Popen(
             place.command("--cores", "2", "--nolock", "--rerun-incomplete", "train"),
             cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
@@ -218,7 +218,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     done = place.run("--cores", "2", "train")
     assert done.returncode == 0, done.stderr[-2000:]
     assert differences(results, folder) == []
-    weights = [load_file(f / "surrogate" / "compact" / "weights.safetensors") for f in (results, folder)]
+    weights = [load_file(f / "surrogate" / "film_unet" / "weights.safetensors") for f in (results, folder)]
     assert all(np.array_equal(weights[0][name], weights[1][name]) for name in weights[0])
 
 

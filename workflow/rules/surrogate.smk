@@ -11,8 +11,8 @@ rule train_member:
             else []
         ),
         begun=lambda wildcards: (
-            f"{RESULTS}/surrogate/{MODELS[wildcards.model].continues}/members/{wildcards.member}/weights.safetensors"
-            if MODELS[wildcards.model].continues
+            f"{RESULTS}/surrogate/{MODELS[wildcards.model].initial_weights}/members/{wildcards.member}/weights.safetensors"
+            if MODELS[wildcards.model].initial_weights
             else []
         ),
         examples=rules.augment_dataset.output.examples,
@@ -48,17 +48,17 @@ rule assemble_model:
         moulds=rules.sample_design.output.moulds,
         weights=lambda wildcards: expand(
             rules.train_member.output.weights,
-            member=range(MODELS[wildcards.model].members),
+            member=range(MODELS[wildcards.model].ensemble_size),
             allow_missing=True,
         ),
         models=lambda wildcards: expand(
             rules.train_member.output.model,
-            member=range(MODELS[wildcards.model].members),
+            member=range(MODELS[wildcards.model].ensemble_size),
             allow_missing=True,
         ),
         histories=lambda wildcards: expand(
             rules.train_member.output.history,
-            member=range(MODELS[wildcards.model].members),
+            member=range(MODELS[wildcards.model].ensemble_size),
             allow_missing=True,
         ),
     output:

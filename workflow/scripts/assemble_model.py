@@ -28,14 +28,9 @@ with logged(snakemake.log[0]):
     described = [describe(folder) for folder in folders]
     save(
         Path(snakemake.output.weights).parent,
-        [member.state_dict() for member in surrogate.members],
-        surrogate.architecture,
-        surrogate.scaling,
-        surrogate.layers,
-        surrogate.pixels,
+        replace(surrogate, calibration=found),
         {name: described[0][name] for name in ("training", "torch")},
         content_hash([content["identity"] for content in described]),
-        found,
     )
     tables = [pd.read_csv(history) for history in snakemake.input.histories]
     with atomic_path(Path(snakemake.output.history)) as path:

@@ -15,14 +15,9 @@ with logged(snakemake.log[0]):
     surrogate, description = load(source), describe(source)
     save(
         target,
-        [member.state_dict() for member in surrogate.members],
-        surrogate.architecture,
-        surrogate.scaling,
-        surrogate.layers,
-        surrogate.pixels,
+        surrogate,
         {name: description[name] for name in ("training", "torch")},
         description["identity"],
-        surrogate.calibration,
         half=True,
     )
     card = model_card(

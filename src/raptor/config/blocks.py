@@ -8,6 +8,7 @@ from raptor.condor.simulate import accuracy_named
 from raptor.core.blocks import Block, Name, Positive, Weight
 from raptor.moulds.geometry import SMALLEST_TETHER
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, NetworkModel, largest_kappa_nnnn
+from raptor.surrogate.rules import ModelRules
 
 AccuracyName = Literal["draft", "standard", "reference"]
 
@@ -126,59 +127,13 @@ class Dataset(Block):
     )
 
 
-class Surrogate(Block):
-    """The network and its training.
+class Surrogate(ModelRules):
+    """A model, and what it is trained on."""
 
-    pix2pix trains with a learning rate of 2e-4, beta1 of 0.5 and an L1 weight of 100; on a few dozen moulds,
-    whose fields fill little of [-1, 1], rate and weight as they stand here did better on validation moulds.
-    """
-
-    model: Name = Field("compact", description="name of the model's folder")
-    network: Literal["pix2pix", "modulated", "compact", "fno"] = Field(
-        "compact",
-        description="pix2pix: the published U-Net; modulated: the same, parameters scaling its "
-        "features; compact: a residual one, or fno: a Fourier neural operator, whose fields obey the physics",
-    )
-    members: int = Field(
-        2, ge=1, le=32, description="networks trained alike from seeds of their own, and averaged"
-    )
+    model: Name = Field("film_unet", description="name of the model's folder")
     extra: Literal["enriched", "random"] | None = Field(
         None, description="further set that it is trained on beside the design's training split"
     )
-    continues: Name | None = Field(
-        None,
-        description="model whose weights training starts from, member by member, in place of random ones",
-    )
-    adversarial: float | None = Field(
-        None,
-        ge=0,
-        description="weight of the discriminator's judgement, 0 without one; null: 1, or 0 but for pix2pix",
-    )
-    loss: Literal["l1", "relative"] = Field(
-        "l1",
-        description="distance to the target: mean absolute error, or root mean square error over the "
-        "target's deviation, a sample and field",
-    )
-    pixels: Literal[16, 32, 64, 128, 256] | None = Field(
-        None,
-        description="side of the images that the network sees, means of fields.pixels; null: 64, or those "
-        "where they are fewer",
-    )
-    base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
-    dropout: float = Field(0.5, ge=0, lt=1, description="in the three deepest decoder layers of U-Nets")
-    patch_layers: int = Field(3, ge=1, le=5, description="strided layers of the discriminator")
-    epochs: Positive = Field(70, description="passes over the augmented examples")
-    batch_size: int = Field(4, ge=2, description="examples a step")
-    learning_rate: float = Field(1e-3, gt=0, lt=1, description="of Adam, for both networks (pix2pix: 2e-4)")
-    beta1: float = Field(0.9, ge=0, lt=1, description="of Adam (pix2pix: 0.5)")
-    lambda_l1: float = Field(1000.0, ge=0, description="weight of the distance (pix2pix: L1, 100)")
-    threads: Positive = Field(1, description="processor threads of the training of a network")
-    precision: Literal["float32", "bfloat16"] = Field(
-        "float32", description="of the networks' layers in training; weights are float32"
-    )
-    compiled: bool = Field(False, description="let torch compile the networks: slower start, faster steps")
-    deterministic: bool = Field(True, description="the same weights every time; slower on a GPU")
-    workers: int = Field(0, ge=0, le=64, description="processes that read examples ahead; 0: training does")
 
 
 class Further(Block):

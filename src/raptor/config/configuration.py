@@ -37,8 +37,8 @@ class Configuration(Block):
     dataset: Dataset = Field(default_factory=lambda: Dataset())
     surrogate: Surrogate = Field(default_factory=lambda: Surrogate())
     compared: dict[Name, dict[str, Any]] = Field(
-        {"pix2pix": {"network": "pix2pix", "beta1": 0.5}},
-        description="further models to compare: what surrogate is, but for the keys given, and one member",
+        {"pix2pix": {"network": "pix2pix", "adversarial": 1.0, "beta1": 0.5}},
+        description="further models to compare: what surrogate is, but for the keys given, and one network",
     )
     chosen: Name | None = Field(
         None,
@@ -70,13 +70,8 @@ class Configuration(Block):
                 )
             if model.extra and name == self.surrogate.model:
                 raise ValueError("surrogate.extra: the enriched set is chosen by surrogate; use compared")
-            if model.continues:
+            if model.initial_weights:
                 self._can_continue(name, model)
-            if model.pixels is not None and model.pixels > self.fields.pixels:
-                raise ValueError(
-                    f"{name}.pixels is {model.pixels}, more than fields.pixels "
-                    f"({self.fields.pixels}); lower it, or leave it out"
-                )
         if self.chosen_model not in self.models:
             raise ValueError(f"chosen is '{self.chosen}'; allowed are {', '.join(self.models)}")
         for pixels in self.tradeoff.pixels:
@@ -90,21 +85,22 @@ class Configuration(Block):
     def _can_continue(self, name: str, model: Surrogate) -> None:
         """A model goes on from one listed before it, so that there is no circle, and of its architecture."""
         earlier = list(self.models)[: list(self.models).index(name)]
-        if model.continues not in earlier:
+        if model.initial_weights not in earlier:
             raise ValueError(
-                f"{name}.continues is '{model.continues}', no model listed before it; allowed are "
-                f"{', '.join(earlier) or 'none'}"
+                f"{name}.initial_weights is '{model.initial_weights}', no model listed before it; allowed "
+                f"are {', '.join(earlier) or 'none'}"
             )
-        begun = self.models[model.continues]
-        for key in ("network", "base_channels", "pixels", "patch_layers", "dropout"):
+        begun = self.models[model.initial_weights]
+        for key in ("network", "base_channels", "pixels"):
             if getattr(model, key) != getattr(begun, key):
-                raise ValueError(f"{name}.{key} differs from that of {begun.model}, which it continues")
-        if model.members > begun.members:
+                raise ValueError(f"{name}.{key} differs from that of {begun.model}, which it starts from")
+        if model.ensemble_size > begun.ensemble_size:
             raise ValueError(
-                f"{name}.members is {model.members}; {begun.model}, which it continues, has {begun.members}"
+                f"{name}.ensemble_size is {model.ensemble_size}; {begun.model}, which it starts from, "
+                f"has {begun.ensemble_size}"
             )
-        if model.network == "pix2pix" and model.adversarial != 0:
-            raise ValueError(f"{name}.continues: no discriminator is kept; set adversarial: 0")
+        if model.adversarial:
+            raise ValueError(f"{name}.initial_weights: no discriminator is kept; set adversarial: 0")
 
     @property
     def chosen_model(self) -> str:
@@ -124,7 +120,7 @@ class Configuration(Block):
     @property
     def models(self) -> dict[str, Surrogate]:
         """Every model to be trained, by name: the surrogate first, then those compared with it."""
-        shared = self.surrogate.model_dump(mode="json") | {"members": 1}
+        shared = self.surrogate.model_dump(mode="json") | {"ensemble_size": 1}
         found = {self.surrogate.model: self.surrogate}
         for name, changes in self.compared.items():
             if name in found:
@@ -205,8 +201,8 @@ class Configuration(Block):
     def model_fingerprint(self, name: str) -> str:
         """Hash of the configuration that each member of a model depends on, and the one it continues."""
         model = self.models[name]
-        own = model.model_dump(mode="json", exclude={"workers", "members"})
-        begun = self.model_fingerprint(model.continues) if model.continues else None
+        own = model.model_dump(mode="json", exclude={"ensemble_size"})
+        begun = self.model_fingerprint(model.initial_weights) if model.initial_weights else None
         return content_hash([self._depends("dataset"), own, begun])
 
     def _depends(self, stage: str) -> Any:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.core.arrays import Array, library_of
 from raptor.raster import normalised
 from raptor.symmetry import FIELDS
 
@@ -26,12 +27,14 @@ def nrmse(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> NDA
     return np.asarray(np.sqrt(error / ((target**2).mean(axis=(-2, -1), dtype=np.float64) + 1e-12)))
 
 
-def without_sign(fields: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Fields (..., 8, y, x) with sxsz and sysz by magnitude: their sign is spontaneous."""
-    spontaneous = [FIELDS.index(field) for field in ("sxsz", "sysz")]
-    fields = fields.copy()
-    fields[..., spontaneous, :, :] = np.abs(fields[..., spontaneous, :, :])
-    return fields
+def without_sign(fields: Array) -> Array:
+    """Fields (..., 8, y, x) with sxsz and sysz by magnitude, as their sign is spontaneous.
+
+    numpy arrays and torch tensors alike.
+    """
+    signed = FIELDS.index("sxsz")  # and what follows it
+    parts = [fields[..., :signed, :, :], abs(fields[..., signed:, :, :])]
+    return library_of(fields).concat(parts, -3)  # type: ignore[no-any-return]
 
 
 def pearson(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:

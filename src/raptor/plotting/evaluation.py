@@ -35,15 +35,15 @@ def training_figure(history: pd.DataFrame) -> Figure:
     losses, errors = figure.subplots(1, 2)
     kept = []
     for member, table in history.groupby("member"):
-        label = f"member {member}"
-        losses.plot(table["epoch"], table["distance"], color=COLOURS[int(str(member)) % 7], label=label)
+        colour = COLOURS[int(str(member)) % 7]
+        losses.plot(table["epoch"], table["reconstruction_loss"], color=colour, label=f"member {member}")
         if table["discriminator_loss"].any():
-            losses.plot(table["epoch"], table["discriminator_loss"], ":", color=COLOURS[int(str(member)) % 7])
-        errors.plot(table["epoch"], table["validation_error"], color=COLOURS[int(str(member)) % 7])
+            losses.plot(table["epoch"], table["discriminator_loss"], ":", color=colour)
+        errors.plot(table["epoch"], table["validation_error"], color=colour)
         best = table.iloc[int(table["validation_error"].argmin())]
-        errors.plot(best["epoch"], best["validation_error"], "o", color=COLOURS[int(str(member)) % 7])
+        errors.plot(best["epoch"], best["validation_error"], "o", color=colour)
         kept.append(float(best["validation_error"]))
-    losses.set(xlabel="epoch", ylabel="distance to the target (dotted: discriminator)", yscale="log")
+    losses.set(xlabel="epoch", ylabel="mean absolute error, scaled (dotted: discriminator)", yscale="log")
     losses.legend(frameon=False, fontsize=7)
     errors.set_title("weights kept: " + ", ".join(f"{value:.3f}" for value in kept))
     errors.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))

@@ -25,8 +25,8 @@ tensor is positive with density as its trace.
 moulds was seen in training. Model version of the simulator {model_version}; RAPTOR {version}.
 
 **Training.** {epochs} passes over the augmented training split{continued}.
-Batches of {batch}, Adam at {rate}, {precision} layers, loss `{loss}`; {minutes:.0f} processor minutes for
-all members. Weights are those of the epoch with the least validation error{stored}.
+Batches of {batch}, Adam at {rate}, {precision} layers, mean absolute error; {minutes:.0f} processor
+minutes for all members. Weights are those of the epoch with the least validation error{stored}.
 
 ## Errors on the held-out simulations
 VRMSE: root mean square error over the simulation's standard deviation. In floors: over the noise
@@ -103,7 +103,6 @@ def model_card(
         batch=training["batch_size"],
         rate=training["learning_rate"],
         precision=training["precision"],
-        loss=training["loss"],
         minutes=history["seconds"].sum() * training["threads"] / 60,
         stored=", stored in half precision" if half else "",
         fields=_rows(
@@ -151,8 +150,8 @@ def model_card(
 
 def _continued(training: Mapping[str, Any]) -> str:
     """On what else, and from what, a training went on, in words."""
-    further = EXTRA.get(training.get("extra") or "", "")
-    begun = training.get("continues")
+    further = "".join(EXTRA.get(campaign, "") for campaign in training["campaigns"])
+    begun = training["initial_weights"]
     return (
         further
         if begun is None

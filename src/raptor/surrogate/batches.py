@@ -1,70 +1,133 @@
-"""Batches of examples for training: kept in memory where they fit, else read ahead of the network."""
+"""Examples as tensors, in batches: kept in memory where they fit, else read as they are needed."""
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate
+from pathlib import Path
 
+import h5py
 import torch
 from torch import Tensor
-from torch.utils.data import DataLoader
+from torch.utils.data import Dataset
 
-from raptor.dataset.loader import ExampleSet
-from raptor.dataset.scaling import INPUTS
+from raptor.core.errors import RaptorError
+from raptor.dataset.examples import Example
+from raptor.dataset.scaling import INPUTS, Scaling, scale_inputs
+from raptor.dataset.stack import read_table
+from raptor.fields.resample import block_average
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
-ROOM = 3 * 2**30  # bytes of the processor's memory that samples may take
-Batches = Iterable[tuple[Tensor, Tensor]]
+MEMORY = 3 * 2**30
+"""Bytes of the processor's memory that examples may take."""
+
+Batch = tuple[Tensor, Tensor]
+"""Scaled inputs (n, 5, y, x) and targets (n, 8, y, x)."""
 
 
-def samples_of(dataset: ExampleSet) -> list[int]:
-    """Rows of the stack that a set's examples are images of."""
-    return sorted({example.sample for example in dataset.examples})
+class ExampleSet(Dataset[Batch]):
+    """Pairs of scaled inputs (5, y, x) and targets (8, y, x), float32, of examples of one or more stacks.
 
+    Reads one sample at a time: memory does not grow with the stacks, unless `keep` is called. Rows of
+    several stacks are counted through.
 
-def fit_on(device: torch.device, datasets: Sequence[ExampleSet]) -> bool:
-    """Whether all samples of some sets fit in half of a GPU's free memory, or `ROOM` of the processor's."""
-    room = 0.5 * torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else ROOM
-    numbers = sum(len(samples_of(dataset)) * dataset.pixels**2 for dataset in datasets)
-    return bool(4 * (len(INPUTS) + len(FIELDS)) * numbers < room)
+    Parameters
+    ----------
+    pixels : int, optional
+        Side of the images, block averages of the stacks'; theirs by default.
 
-
-class Feeder:
-    """Gives the examples of a set in any order, in batches on a device.
-
-    Where they are `resident`, samples are read once and stay on the device, and images are moved under D4
-    there. Otherwise they are read as they are needed, by `workers` processes of their own if there are any.
+    Raises
+    ------
+    RaptorError
+        Where a stack cannot be read.
     """
 
     def __init__(
-        self, dataset: ExampleSet, device: torch.device, workers: int = 0, resident: bool = False
+        self,
+        stacks: Path | Sequence[Path],
+        examples: Sequence[Example],
+        scaling: Scaling,
+        pixels: int | None = None,
     ) -> None:
-        self.dataset, self.device, self.workers, self.resident = dataset, device, workers, resident
-        if resident:
-            self._load()
+        self.stacks = [stacks] if isinstance(stacks, Path) else list(stacks)
+        tables = [read_table(stack) for stack in self.stacks]
+        self.parameters = [values for table in tables for values in table.parameters]
+        self.starts = [0, *accumulate(len(table.parameters) for table in tables)][:-1]
+        self.examples, self.scaling = examples, scaling
+        self.pixels = pixels or tables[0].pixels
+        self.kept: dict[int, Batch] = {}
 
     def __len__(self) -> int:
-        return len(self.dataset)
+        return len(self.examples)
 
-    def _load(self) -> None:
-        rows, size = samples_of(self.dataset), 2 * (self.dataset.pixels,)
-        self.place = {row: number for number, row in enumerate(rows)}
-        self.inputs = torch.empty(len(rows), len(INPUTS), *size, device=self.device)
-        self.targets = torch.empty(len(rows), len(FIELDS), *size, device=self.device)
-        for number, row in enumerate(rows):
-            inputs, target = self.dataset.sample(row)
-            self.inputs[number].copy_(inputs)
-            self.targets[number].copy_(target)
+    def __getitem__(self, number: int) -> Batch:
+        """Inputs and targets of an example."""
+        example = self.examples[number]
+        inputs, target = self.kept.get(example.sample) or self.read(example.sample)
+        element = Element.from_index(example.element)
+        return move_pixels(inputs, element), apply(target, element)
 
-    def batches(self, order: Sequence[int], size: int) -> Batches:
-        """Inputs (n, 5, y, x) and targets (n, 8, y, x) of the examples in this order, n = size or fewer."""
-        if self.resident:
-            return self._moved(order, size)
-        loader = DataLoader(self.dataset, size, sampler=order, num_workers=self.workers)
-        return ((inputs.to(self.device), target.to(self.device)) for inputs, target in loader)
-
-    def _moved(self, order: Sequence[int], size: int) -> Iterator[tuple[Tensor, Tensor]]:
-        for start in range(0, len(order), size):
-            chosen = [self.dataset.examples[number] for number in order[start : start + size]]
-            where = [(self.place[e.sample], Element.from_index(e.element)) for e in chosen]
-            yield (
-                torch.stack([move_pixels(self.inputs[row], element) for row, element in where]),
-                torch.stack([apply(self.targets[row], element) for row, element in where]),
+    def read(self, row: int) -> Batch:
+        """Inputs and targets of a row of the stacks, as simulated."""
+        number = bisect_right(self.starts, row) - 1
+        with h5py.File(self.stacks[number], "r") as file:
+            depression, tethers, fields = (
+                file[name][row - self.starts[number]] for name in ("depression", "tethers", "fields")
             )
+        inputs = scale_inputs(depression, tethers, self.parameters[row])
+        inputs, target = (
+            block_average(inputs, self.pixels),
+            block_average(self.scaling.forward(fields), self.pixels),
+        )
+        return torch.from_numpy(inputs), torch.from_numpy(target)
+
+    @property
+    def rows(self) -> set[int]:
+        """Rows of the stacks that the examples are images of."""
+        return {example.sample for example in self.examples}
+
+    def keep(self, device: torch.device) -> None:
+        """Read every sample once and keep it on a device, where D4 then moves it."""
+        for row in sorted(self.rows):
+            inputs, target = self.read(row)
+            self.kept[row] = inputs.to(device), target.to(device)
+
+    def batches(self, order: Sequence[int], size: int, device: torch.device) -> Iterator[Batch]:
+        """Batches of `size` examples, or fewer at the end, in this order."""
+        for start in range(0, len(order), size):
+            inputs, targets = zip(*(self[number] for number in order[start : start + size]), strict=True)
+            yield torch.stack(inputs).to(device), torch.stack(targets).to(device)
+
+
+def split_examples(
+    stacks: Sequence[Path], examples: Iterable[Example], splits: Sequence[str], scaling: Scaling, pixels: int
+) -> tuple[ExampleSet, ExampleSet]:
+    """Examples of the training and of the validation split.
+
+    Parameters
+    ----------
+    splits : sequence of str
+        Split of each sample of the stacks, rows counted through them.
+
+    Raises
+    ------
+    RaptorError
+        Where a split has no example.
+    """
+    parts: dict[str, list[Example]] = {"train": [], "validation": []}
+    for example in examples:
+        if splits[example.sample] in parts:
+            parts[splits[example.sample]].append(example)
+    for name, part in parts.items():
+        if not part:
+            raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
+    training, validation = (ExampleSet(stacks, part, scaling, pixels) for part in parts.values())
+    return training, validation
+
+
+def keep_if_they_fit(sets: Sequence[ExampleSet], device: torch.device) -> None:
+    """Keep all samples on a device if they take less than half of a GPU's free memory, or `MEMORY`."""
+    free = 0.5 * torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else MEMORY
+    numbers = sum(len(each.rows) * each.pixels**2 for each in sets) * (len(INPUTS) + len(FIELDS))
+    if numbers * torch.finfo(torch.float32).bits // 8 < free:
+        for each in sets:
+            each.keep(device)

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from torch.nn.functional import conv2d, softplus
 
 from raptor.dataset.scaling import Scaling
+from raptor.fields.metrics import without_sign
 from raptor.frame import pixel_size
 from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
@@ -116,7 +117,7 @@ def average(fields: Tensor) -> Tensor:
 
     Their signs mean nothing, and magnitudes are what D4 moves like any image; `signed` gives signs back.
     """
-    return unsigned(fields).mean(0)
+    return without_sign(fields).mean(0)
 
 
 def signed(fields: Tensor) -> Tensor:
@@ -134,8 +135,3 @@ def signed(fields: Tensor) -> Tensor:
     taken = c * x * x - 2 * b * x * y + a * y * y
     short = torch.where(taken > room, torch.sqrt(room / taken.clamp(min=SMALL)), 1.0)
     return torch.cat([fields[:, :XZ], (x * short)[:, None], (y * short)[:, None]], dim=1)
-
-
-def unsigned(fields: Tensor) -> Tensor:
-    """Fields (..., 8, y, x) with sxsz and sysz by magnitude, for losses and errors."""
-    return torch.cat([fields[..., :XZ, :, :], fields[..., XZ:, :, :].abs()], dim=-3)

@@ -37,7 +37,7 @@ def costs_of(
     return {
         "network": surrogate.architecture.network,
         "pixels": surrogate.architecture.pixels,
-        "members": len(surrogate.members),
+        "ensemble_size": len(surrogate.members),
         "weights": surrogate.weights,
         "epochs": int(history["epoch"].max()) + 1,
         "training_core_minutes": float(history["seconds"].sum() * training["threads"] / 60),

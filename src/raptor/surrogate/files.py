@@ -1,7 +1,7 @@
 """Models and predictions as files."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,49 +21,50 @@ from raptor.frame import pixel_centres
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.surrogate.bands import LEVELS, Calibration
+from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Prediction, Surrogate
-from raptor.surrogate.networks import Architecture, Generator
+from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS
 
 SHIPPED = Path(__file__).parent / "shipped"
 WIDEST = 1.96  # standard deviations of a normal error in the widest band
-POINTS = "novelty.points"
+DESCRIPTORS = "training_descriptors"  # beside the weights
 WEIGHTS, MODEL = "weights.safetensors", "model.json"
 
 
 def save(
-    folder: Path,
-    members: Sequence[Mapping[str, Tensor]],
-    architecture: Architecture,
-    scaling: Scaling,
-    layers: int,
-    pixels: int,
-    description: dict[str, Any],
-    identity: str,
-    calibration: Calibration | None = None,
-    *,
-    half: bool = False,
+    folder: Path, surrogate: Surrogate, description: Mapping[str, Any], identity: str, *, half: bool = False
 ) -> None:
-    """Write weights.safetensors and model.json; `identity` of the training stands in both.
+    """Write weights.safetensors and model.json.
 
-    `half` writes weights as float16, which takes half the room and changes predictions by less than 1e-3.
+    Parameters
+    ----------
+    description : mapping
+        How it was trained: `training.describe`.
+    identity : str
+        Hash of the training, which stands in both files.
+    half : bool
+        Write weights as float16, which takes half the room and changes predictions by less than 1e-3.
     """
-    tensors = {f"{n}.{name}": value for n, state in enumerate(members) for name, value in state.items()}
-    if half:
-        tensors = {k: v.half() if v.dtype == torch.float32 else v for k, v in tensors.items()}
+    tensors = {
+        f"{number}.{name}": value.half() if half and value.dtype == torch.float32 else value
+        for number, member in enumerate(surrogate.members)
+        for name, value in member.state_dict().items()
+    }
+    calibration = surrogate.calibration
     if calibration is not None:
-        tensors[POINTS] = torch.from_numpy(calibration.novelty.points)
+        tensors[DESCRIPTORS] = torch.from_numpy(calibration.novelty.points)
     with atomic_path(folder / WEIGHTS) as temporary:
         contiguous = {name: value.contiguous() for name, value in tensors.items()}
         save_file(contiguous, temporary, metadata={"identity": identity})
     content = {
         **description,
         "identity": identity,
-        "members": len(members),
-        "architecture": architecture.as_json(),
-        "normalisation": scaling.as_json(),
-        "layers": layers,
-        "pixels": pixels,
+        "ensemble_size": len(surrogate.members),
+        "architecture": surrogate.architecture.model_dump(),
+        "normalisation": surrogate.scaling.as_json(),
+        "layers": surrogate.layers,
+        "pixels": surrogate.pixels,
         "model_version": MODEL_VERSION,
         "calibration": None if calibration is None else calibration.as_json(),
     }
@@ -97,9 +98,9 @@ def load(folder: Path) -> Surrogate:
     folder = Path(folder)
     content = describe(folder)
     try:
-        architecture = Architecture(**content["architecture"])
+        architecture = Architecture.model_validate(content["architecture"])
         scaling = Scaling.from_json(content["normalisation"])
-        layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "members"))
+        layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "ensemble_size"))
     except (ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / MODEL} cannot be read: {error}") from error
     members = tuple(Generator(architecture, scaling) for _ in range(count))
@@ -109,7 +110,7 @@ def load(folder: Path) -> Surrogate:
         if identity != content.get("identity"):
             raise RuntimeError("they are of two trainings")
         tensors = load_file(folder / WEIGHTS)
-        points = tensors.pop(POINTS, None)
+        points = tensors.pop(DESCRIPTORS, None)
         for number, member in enumerate(members):
             member.load_state_dict(_of_member(tensors, number))
             member.eval()

@@ -13,16 +13,18 @@ from torch.nn.functional import interpolate
 
 from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import Scaling, scale_inputs
-from raptor.fields.resample import pooled, refined
+from raptor.fields.metrics import without_sign
+from raptor.fields.resample import block_average, deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Bands, Calibration
-from raptor.surrogate.constraints import average, project, signed, unsigned
-from raptor.surrogate.networks import Architecture, Generator
+from raptor.surrogate.constraints import average, project, signed
+from raptor.surrogate.generator import Generator
 from raptor.surrogate.out_of_distribution import descriptors
+from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 BATCH = 16
@@ -178,7 +180,7 @@ class Surrogate:
         of_members = images.reshape(len(self.members), -1, *images.shape[1:])
         means = torch.cat([_means(images[None]), _means(of_members)])
         fine = self._fine(means, masks, cast.n_cells).numpy()
-        spread = unsigned(images).std(dim=0, correction=1)
+        spread = without_sign(images).std(dim=0, correction=1)
         wide = interpolate(spread[None], size=2 * (self.pixels,), mode="bilinear")[0].numpy()
         return fine[0], wide, fine[1:, 0]
 
@@ -211,7 +213,7 @@ class Surrogate:
         """
         seen = self.architecture.pixels
         elements = Element.all() if averaged else Element.all()[:1]
-        coarse = pooled(masks, seen)
+        coarse = block_average(masks, seen)
         moved = [move_pixels(coarse, element).numpy() for element in elements]
         scaled_inputs = [
             scale_inputs(depression, tethers, values)
@@ -235,7 +237,7 @@ class Surrogate:
 
     def _fine(self, means: Tensor, masks: Tensor, cells: int) -> Tensor:
         """Fields (n, 8, y, x) of the whole raster, obeying the physics, from means (n, 8, y', x')."""
-        fields = signed(refined(means, self.pixels))
+        fields = signed(deconvolve(means, self.pixels))
         if self.members[0].physical is not None and self.architecture.pixels == self.pixels:
             return fields
         depression = masks[:1].expand(len(fields), 1, -1, -1)

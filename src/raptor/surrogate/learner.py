@@ -1,0 +1,108 @@
+"""One step of training: a generator, its discriminator if it has one, and their optimisers."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from raptor.dataset.scaling import Scaling
+from raptor.surrogate.generator import Generator
+from raptor.surrogate.losses import adversarial_loss, discriminator_loss, reconstruction_loss
+from raptor.surrogate.networks import Discriminator
+from raptor.surrogate.rules import Architecture, TrainingRules
+
+LOSSES = ("generator_loss", "reconstruction_loss", "discriminator_loss")
+
+
+class Learner:
+    """Networks in training.
+
+    Parameters
+    ----------
+    seed : int
+        Of the first weights.
+    """
+
+    def __init__(
+        self,
+        architecture: Architecture,
+        scaling: Scaling,
+        rules: TrainingRules,
+        seed: int,
+        device: torch.device,
+    ) -> None:
+        torch.manual_seed(seed)
+        self.rules, self.scaling = rules, scaling
+        self.generator = Generator(architecture, scaling)
+        networks: dict[str, nn.Module] = {"generator": self.generator}
+        if rules.adversarial:
+            networks["discriminator"] = Discriminator(architecture.pixels, architecture.base_channels)
+        # Convolutions on a GPU's tensor cores want the channels together.
+        layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
+        for network in networks.values():
+            network.to(device=device, memory_format=layout)  # type: ignore[call-overload]
+        self.networks = networks
+        self.optimisers = {
+            name: torch.optim.Adam(network.parameters(), rules.learning_rate, (rules.beta1, 0.999))
+            for name, network in networks.items()
+        }
+
+    def start_epoch(self, epoch: int) -> None:
+        """Set networks to training, and the learning rate: constant, then linearly to zero."""
+        rate = self.rules.learning_rate * min(1.0, 2 * (1 - epoch / self.rules.epochs))
+        for name, network in self.networks.items():
+            network.train()
+            for group in self.optimisers[name].param_groups:
+                group["lr"] = rate
+
+    def step(self, inputs: Tensor, target: Tensor) -> Tensor:
+        """Improve the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
+        prediction = self._evaluate("generator", inputs, cells_of(target, self.scaling))
+        reconstruction = reconstruction_loss(prediction, target, signed="discriminator" in self.networks)
+        total = self.rules.reconstruction_weight * reconstruction
+        adversary = torch.zeros((), device=inputs.device)
+        if "discriminator" in self.networks:
+            logits = [
+                self._evaluate("discriminator", inputs, fields) for fields in (target, prediction.detach())
+            ]
+            adversary = discriminator_loss(*logits)
+            self._descend("discriminator", adversary)
+            self.networks["discriminator"].requires_grad_(False)
+            opinion = self._evaluate("discriminator", inputs, prediction)
+            total = total + self.rules.adversarial * adversarial_loss(opinion)
+        self._descend("generator", total)
+        if "discriminator" in self.networks:
+            self.networks["discriminator"].requires_grad_(True)
+        return torch.stack([total, reconstruction, adversary]).detach().double()
+
+    def _evaluate(self, name: str, *images: Tensor) -> Tensor:
+        """A network's answer, computed in the precision of the rules, in float32."""
+        half = self.rules.precision == "bfloat16"
+        with torch.autocast(images[0].device.type, torch.bfloat16, enabled=half):
+            found: Tensor = self.networks[name](*images)
+        return found.float()
+
+    def _descend(self, name: str, loss: Tensor) -> None:
+        """One step of a network's optimiser."""
+        self.optimisers[name].zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        self.optimisers[name].step()
+
+    def state_dict(self) -> dict[str, Any]:
+        """Weights and the state of the optimisers."""
+        return {
+            "networks": {name: network.state_dict() for name, network in self.networks.items()},
+            "optimisers": {name: optimiser.state_dict() for name, optimiser in self.optimisers.items()},
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Take up what `state_dict` gave."""
+        for name, network in self.networks.items():
+            network.load_state_dict(state["networks"][name])
+            self.optimisers[name].load_state_dict(state["optimisers"][name])
+
+
+def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:
+    """Numbers of cells (n,) that scaled fields (n, 8, y, x) hold: the sum of their density."""
+    return (fields[:, 0].double() * scaling.scale[0] + scaling.offset[0]).sum((1, 2)).float()

@@ -1,4 +1,4 @@
-"""Measuring an experiment: from a picture of a tissue in its mould to its outline, area and width."""
+"""Measurement of experiments: outline, area and width of a tissue from a picture of it in its mould."""
 
 from collections.abc import Sequence
 
@@ -33,14 +33,14 @@ def register(
     is_aligned: bool = False,
     mirrored: bool = False,
 ) -> Registration:
-    """Register a picture by landmarks where given, as aligned where told so, otherwise by the rim.
+    """Register a picture by its landmarks, as aligned, or else by the rim of the depression.
 
-    Landmarks are in pixels of the file.
+    Landmarks are in pixels of the file. A mask needs landmarks or alignment.
 
     Raises
     ------
     RaptorError
-        Where the two are given together, a mask comes without either, or the registration fails.
+        If both are given, if a mask comes with neither, or if the registration fails.
     """
     if landmarks and is_aligned:
         raise RaptorError("give landmarks or --aligned, not both")

@@ -1,8 +1,8 @@
-"""Uneven light: a smooth field that multiplies the brightness of everything in a picture.
+"""Uneven illumination: a smooth field that multiplies the brightness of the whole picture.
 
-In logarithms it is added. It is fitted as a polynomial in the two coordinates together with one
-level for each kind of surface (plate, floor, tissue), which are constant but for the light; this is
-retrospective shading correction (Likar, Maintz, Viergever and Pernus 2000, J. Microsc. 197, 285).
+The logarithm of brightness is fitted as a polynomial in the two coordinates plus one constant for
+each kind of surface (plate, floor, tissue): retrospective shading correction (Likar, Maintz,
+Viergever and Pernus 2000, J. Microsc. 197, 285).
 """
 
 import numpy as np
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, label
 
 DARKEST = 0.004  # of the brightest pixel, about a level of 8 bits; keeps logarithms finite
-MOST_PIXELS = 30_000  # that a fit uses
-TRIMMED = 3.0  # standard deviations; what lies farther off is left out of the next fit
-FRAME = 0.03  # of the shorter side: the strip along the picture's edge that shows the plate
+MOST_PIXELS = 30_000  # used by a fit
+TRIMMED = 3.0  # standard deviations; larger residuals are left out of the next fit
+FRAME = 0.03  # of the shorter side: the strip along the picture's border that shows the plate
 PLATE = 5.0  # standard deviations within which a pixel looks like the plate
-LEAST_SPREAD = 0.002  # half a level of 8 bits; a picture without noise has its rounding
+LEAST_SPREAD = 0.002  # half a level of 8 bits: a picture without noise still has rounding
 IGNORED = -1
 
 
@@ -27,7 +27,7 @@ def log_brightness(values: NDArray[np.float64], sigma: float) -> NDArray[np.floa
 def fit_light(
     log: NDArray[np.float64], labels: NDArray[np.int8], degree: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The light's logarithm (row, column), of mean 0, and the level of each label, by least squares.
+    """Logarithm of the illumination (row, column), mean 0, and of each label's level, by least squares.
 
     Parameters
     ----------
@@ -59,21 +59,21 @@ def fit_light(
 
 
 def find_plate(log: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64], float]:
-    """What looks like the picture's edge and is connected to it, with the light taken out.
+    """The plate: pixels that look like the picture's border and are connected to it.
 
     Returns
     -------
     plate : array (row, column)
-        Where the plate around the mould is seen.
+        Where the plate around the mould is visible.
     flat : array (row, column)
-        Logarithm of brightness over that of the plate.
+        Logarithm of brightness over that of the plate, illumination removed.
     spread : float
         Standard deviation of `flat` on the plate.
     """
     strip = max(2, round(FRAME * min(log.shape)))
     plate = np.ones(log.shape, dtype=bool)
     plate[strip:-strip, strip:-strip] = False
-    for degree in (2, 2, 3, 3):  # a thin frame determines no more than degree 3
+    for degree in (2, 2, 3, 3):  # a thin frame determines at most degree 3
         light, levels = fit_light(log, np.where(plate, 0, IGNORED).astype(np.int8), degree)
         flat = log - light - levels[0]
         spread = max(LEAST_SPREAD, float(1.4826 * np.median(np.abs(flat[plate]))))

@@ -1,8 +1,7 @@
 """Where the mould lies in a picture: the similarity that takes l0 to pixels.
 
-Pixels are (column, row), row 0 at the top, and a pixel's centre has whole coordinates. y of the mould
-points up, so a picture taken from above shows the mould with its rows running down; a picture taken
-from below, or through a mirror, is `mirrored`.
+Pixels are (column, row), row 0 at the top; pixel centres have integer coordinates. The mould's y axis
+points up and rows run down. A picture taken from below, or through a mirror, is `mirrored`.
 """
 
 import re
@@ -33,10 +32,10 @@ class Registration:
     matrix : array (3, 3)
         Takes (x, y, 1) in l0 to (column, row, 1).
     method : str
-        "rim", "landmarks" or "frame", the picture's own.
+        "rim", "landmarks" or "frame" (the picture's borders).
     residual : float
-        Root mean square distance between what was seen and where it should lie, l0; NaN where
-        nothing is left to compare.
+        Root mean square distance between observed and expected positions, l0; NaN if there are no
+        positions beyond those that determine the similarity.
     """
 
     matrix: NDArray[np.float64]
@@ -62,7 +61,7 @@ class Registration:
         return (pixels - self.matrix[:2, 2]) @ np.linalg.inv(self.matrix[:2, :2]).T
 
     def covers(self, shape: shapely.Geometry, size: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Pixels (row, column) of a picture of a size whose centres lie in a shape without holes, l0."""
+        """Pixels (row, column) whose centres lie in a shape without holes, l0; `size` is the picture's."""
         inside = np.zeros(size, dtype=bool)
         for part in shapely.get_parts(shape):
             corners = self.to_pixels(shapely.get_coordinates(part.exterior))
@@ -71,18 +70,18 @@ class Registration:
 
 
 def aligned(size: tuple[int, ...]) -> Registration:
-    """The registration of a square picture that spans the mould's image, its top at the highest y.
+    """The registration of a square picture that spans the mould's frame, highest y at the top.
 
     Raises
     ------
     RaptorError
-        Where the picture is not square.
+        If the picture is not square.
     """
     rows, columns = size
     if rows != columns:
         raise RaptorError(
             f"the image is {columns} x {rows} pixels; an aligned one is square and spans {IMAGE_SIZE} l0, "
-            "so cut it out or leave --aligned away"
+            "so crop it or drop --aligned"
         )
     scale, middle = rows / IMAGE_SIZE, (rows - 1) / 2
     matrix = np.array([[scale, 0, middle], [0, -scale, middle], [0, 0, 1]])
@@ -92,15 +91,15 @@ def aligned(size: tuple[int, ...]) -> Registration:
 def from_landmarks(
     pixels: NDArray[np.float64], points: NDArray[np.float64], mirrored: bool = False
 ) -> Registration:
-    """The similarity that takes points (n, 2) in l0 to columns and rows (n, 2) with least squares.
+    """The least-squares similarity from points (n, 2) in l0 to columns and rows (n, 2).
 
     Raises
     ------
     RaptorError
-        Where there are fewer than two, two in one place, or their residual is above 0.5 l0.
+        If there are fewer than two, all lie in one place, or their residual is above 0.5 l0.
     """
     if len(points) < 2:
-        raise RaptorError(f"{len(points)} landmark is given; at least two are needed, three to have a check")
+        raise RaptorError(f"{len(points)} landmark given; give at least two, three to get a residual")
     handed = points * (1, 1 if mirrored else -1)
     apart = min(float(np.ptp(handed, axis=0).max()), float(np.ptp(pixels, axis=0).max()))
     similarity = SimilarityTransform.from_estimate(handed, pixels) if apart > 1e-6 else None
@@ -113,8 +112,8 @@ def from_landmarks(
     if residual > MAX_LANDMARK_RESIDUAL:
         worst = int(np.argmax(np.linalg.norm(misses, axis=1))) + 1
         raise RaptorError(
-            f"the landmarks do not fit the mould: residual {residual:.2f} l0, at most "
-            f"{MAX_LANDMARK_RESIDUAL} is allowed; look at landmark {worst} first, and at --mirrored"
+            f"the landmarks do not fit the mould: residual {residual:.2f} l0, above "
+            f"{MAX_LANDMARK_RESIDUAL}; check landmark {worst} first, then --mirrored"
         )
     return Registration(matrix, "landmarks", residual)
 
@@ -122,14 +121,14 @@ def from_landmarks(
 def parse_landmarks(
     landmarks: Sequence[str], mould: Mould
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Columns and rows (n, 2), and points (n, 2) in l0, of landmarks as the command line gives them.
+    """Columns and rows (n, 2) and points (n, 2) in l0 of landmarks given on the command line.
 
     A landmark is "column,row=x,y", or "column,row=tether 1" for the centre of a tether in file order.
 
     Raises
     ------
     RaptorError
-        Where one has another form, or names a tether that the mould has not.
+        If one has another form, or names a tether that the mould does not have.
     """
     pixels, points = [], []
     for landmark in landmarks:

@@ -1,4 +1,4 @@
-"""What was measured: as a sentence, as JSON and as GeoJSON."""
+"""A measurement as a sentence, as JSON and as GeoJSON."""
 
 from math import isfinite
 from typing import Any
@@ -11,7 +11,7 @@ from raptor.moulds import Mould
 
 
 def as_record(measurement: Measurement, picture: Picture, mould: Mould) -> dict[str, Any]:
-    """What was measured, by name, for a machine; what is not known is None.
+    """A measurement by name, for scripts; unknown values are None.
 
     `residual` in l0, `pixels_per_l0` in pixels of the file, `angle` in degrees counter-clockwise,
     `threshold` over the plate's brightness, `contrast` in standard deviations.
@@ -35,7 +35,7 @@ def as_record(measurement: Measurement, picture: Picture, mould: Mould) -> dict[
 
 
 def as_feature(measurement: Measurement, picture: Picture, mould: Mould) -> dict[str, Any]:
-    """The tissue's outline in l0, and what was measured, as a GeoJSON feature."""
+    """The tissue's outline in l0 with the measurement as properties, a GeoJSON feature."""
     return {
         "type": "Feature",
         "geometry": shapely.geometry.mapping(measurement.outline),
@@ -44,7 +44,7 @@ def as_feature(measurement: Measurement, picture: Picture, mould: Mould) -> dict
 
 
 def as_sentence(measurement: Measurement, picture: Picture) -> str:
-    """What was measured, in one line."""
+    """A measurement in one line."""
     registration = measurement.registration
     width = f"{measurement.width_ratio:.3f}" if isfinite(measurement.width_ratio) else "none"
     contrast = f", contrast {measurement.contrast:.1f}" if isfinite(measurement.contrast) else ""
@@ -53,5 +53,5 @@ def as_sentence(measurement: Measurement, picture: Picture) -> str:
         f"A/A0 {measurement.area_ratio:.3f}, w/w0 {width}; {measurement.tissue.value} tissue, threshold "
         f"{measurement.threshold:.3g}{contrast}; registered by {registration.method}{residual}, "
         f"{registration.scale * picture.reduction:.1f} pixels per l0, "
-        f"turned by {registration.angle:.1f} degrees"
+        f"rotated by {registration.angle:.1f} degrees"
     )

@@ -1,8 +1,8 @@
-"""Registration by the rim: the edge of the depression, which looks unlike the plate around it.
+"""Registration by the rim, the edge between the depression and the plate around it.
 
-What is not plate gives a first position, size and direction; then edges are sought across the
-outline and the tethers as they would lie in the picture, and the similarity is fitted to them (the
-search of active shape models: Cootes, Taylor, Cooper and Graham 1995, Comput. Vis. Image Underst. 61, 38).
+The region that is not plate gives an initial position, size and orientation. Edges are then searched for
+across the outline and tethers, and the similarity is fitted to them, as in active shape models (Cootes,
+Taylor, Cooper and Graham 1995, Comput. Vis. Image Underst. 61, 38).
 """
 
 from dataclasses import dataclass
@@ -29,21 +29,21 @@ from raptor.imaging.registration import Registration
 from raptor.moulds import Mould
 
 SMOOTHING = 1.5  # pixels
-ANGLES = 120  # directions tried
+ANGLES = 120  # orientations tried
 SPACING = 0.25  # l0, between points on the mould's edges
 CORNER = 0.6  # l0 around a corner, where blur moves the edge
-WIDE, CLOSE = (2.5, 1.0, 1.0), (0.6, 0.4, 0.4)  # l0 to either side in which an edge is sought, in turn
-BLURRED = 6  # pixels in which the rim's slope from plate to floor lies
-GAP = 4  # pixels; what looks like plate and is as narrow is no plate
-EDGE = 6.0  # times the plate's slopes: the least slope of an edge
-MIN_OVERLAP = 0.85, 0.95  # of the region found and the outline, before and after the fit
-MIN_SEEN = 0.6  # of the rim
-NEAR = 0.3  # l0; an edge counts as the mould's within it
-MAX_RESIDUAL = 0.1  # l0, root mean square of the edges that count
-BAND = 0.9  # l0 to either side of the rim in which there may be no second edge
-BAND_PART = 0.35  # of the rim, along which there is one
-SECOND_EDGE = 0.2  # of the rim's slope
-MIN_SCALE = 8.0  # pixels per l0; below it a tissue near the rim is not told from it
+WIDE, CLOSE = (2.5, 1.0, 1.0), (0.6, 0.4, 0.4)  # l0, successive search distances to either side
+BLURRED = 6  # pixels over which brightness changes from plate to floor
+GAP = 4  # pixels; plate-like regions this narrow are not plate
+EDGE = 6.0  # smallest slope of an edge, relative to the slopes of the plate
+MIN_OVERLAP = 0.85, 0.95  # between the region found and the outline, before and after the fit
+MIN_SEEN = 0.6  # share of the rim that must be visible
+NEAR = 0.3  # l0; edges within this distance belong to the mould
+MAX_RESIDUAL = 0.1  # l0, root mean square over those edges
+BAND = 0.9  # l0 to either side of the rim where a second edge is refused
+BAND_PART = 0.35  # share of the rim along which a second edge counts
+SECOND_EDGE = 0.2  # its slope, relative to the rim's
+MIN_SCALE = 8.0  # pixels per l0; needed to separate a tissue near the rim from it
 ADVICE = "show the whole mould with plate around it, try --mirrored, or give --landmark or --aligned"
 
 
@@ -66,17 +66,17 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     Raises
     ------
     RaptorError
-        Where no rim is seen, or what is seen does not have the mould's shape.
+        If no rim is visible, or what is visible does not have the mould's shape.
     """
     plate, flat, _ = find_plate(log_brightness(values, SMOOTHING))
-    # Of brightness itself, for the steepest slope of its logarithm lies on an edge's dark side.
+    # Brightness itself: the steepest slope of its logarithm lies on the dark side of an edge.
     even = np.exp(flat)
     slopes = np.hypot(*np.gradient(even))
     region = _region(plate, slopes)
     polygon = _as_polygon(region)
     found = _start(polygon, mould, mirrored)
     edges = mould_edges(mould)
-    # First to the region's boundary alone: a tissue near the rim has stronger edges.
+    # First the boundary of the region alone: a tissue near the rim has stronger edges.
     rim = edges.of_rim()
     for reach in WIDE:
         found = _fit(found, rim, _edge_offsets(region.astype(float), rim, found, reach, 0.1))
@@ -85,8 +85,8 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
         found = _fit(found, edges, _edge_offsets(even, edges, found, reach, least))
     if found.scale < MIN_SCALE:
         raise RaptorError(
-            f"the mould is small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} are "
-            "needed; photograph it from nearer, cut the image out around it, or give --landmark"
+            f"the mould is too small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} "
+            "are needed; photograph it from closer, crop the image around it, or give --landmark"
         )
     _require_overlap(_overlap(found, mould, polygon), MIN_OVERLAP[1], mould)
     offsets = _edge_offsets(even, rim, found, CLOSE[-1], least)
@@ -94,9 +94,9 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
     if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
         raise RaptorError(
-            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is seen, at least "
-            f"{100 * MIN_SEEN:.0f} % is needed, with a residual of {residual:.2f} l0, at most {MAX_RESIDUAL} "
-            f"is allowed; {ADVICE}"
+            f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is visible (at least "
+            f"{100 * MIN_SEEN:.0f} % is needed) with a residual of {residual:.2f} l0 (at most {MAX_RESIDUAL} "
+            f"is allowed); {ADVICE}"
         )
     _require_one_edge(even, rim, found, mould)
     return Registration(found.matrix, "rim", residual)
@@ -120,7 +120,7 @@ def _edge_points(polygon: shapely.Polygon) -> tuple[NDArray[np.float64], NDArray
     ahead, behind = after - at, at - before
     tangent = ahead + behind
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    # A tether's curve turns too, but less than a corner does.
+    # A tether's edge bends too, but less than a corner.
     cosine = np.sum(ahead * behind, axis=1) / np.linalg.norm(ahead, axis=1) / np.linalg.norm(behind, axis=1)
     straight = cosine > 0.8
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
@@ -128,7 +128,7 @@ def _edge_points(polygon: shapely.Polygon) -> tuple[NDArray[np.float64], NDArray
 
 
 def _region(plate: NDArray[np.bool_], slopes: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """The largest thing (row, column) that is not plate, gaps and holes filled, out to the steepest slope."""
+    """The largest region (row, column) that is not plate, gaps filled, out to the steepest slope."""
     there = binary_opening(np.pad(~plate, GAP), iterations=2)
     there = binary_fill_holes(binary_closing(there, iterations=GAP))[GAP:-GAP, GAP:-GAP]
     pieces, _ = label(there)
@@ -137,7 +137,7 @@ def _region(plate: NDArray[np.bool_], slopes: NDArray[np.float64]) -> NDArray[np
     largest = pieces == sizes.argmax()
     core = binary_erosion(largest, iterations=BLURRED) & (sizes.max() > 0)
     if not core.any():
-        raise RaptorError(f"no mould is seen: the image shows one surface; {ADVICE}")
+        raise RaptorError(f"no mould is visible: the image shows one surface; {ADVICE}")
     markers = np.where(core, 1, 0) + np.where(largest, 0, 2)
     return np.asarray(watershed(slopes, markers) == 1)
 
@@ -179,7 +179,7 @@ def _overlap(registration: Registration, mould: Mould, region: shapely.Polygon) 
 def _require_overlap(overlap: float, least: float, mould: Mould) -> None:
     if overlap < least:
         raise RaptorError(
-            f"what is seen does not have the shape of {mould.name}: it overlaps with it by "
+            f"the region in the image does not have the shape of {mould.name}: they overlap by "
             f"{100 * overlap:.0f} %, at least {100 * least:.0f} % is needed; {ADVICE}"
         )
 
@@ -200,9 +200,9 @@ def _slopes_across(
 def _require_one_edge(
     even: NDArray[np.float64], rim: Edges, registration: Registration, mould: Mould
 ) -> None:
-    """Refuse a wall seen as a band: a second edge at one distance along much of the rim."""
+    """Refuse a wall visible as a band: a second edge at a fixed distance along much of the rim."""
     along, slopes = _slopes_across(even, rim, registration, BAND)
-    # Of rising and of falling slopes, what a part of the rim is above.
+    # The rising and falling slopes that a given share of the rim exceeds.
     common = np.abs(np.percentile(slopes, [100 * BAND_PART, 100 * (1 - BAND_PART)], axis=0)).max(axis=0)
     apart = np.abs(along) > max(NEAR, BLURRED / 2 / registration.scale)
     peaks, _ = find_peaks(common, height=SECOND_EDGE * common.max())
@@ -210,7 +210,7 @@ def _require_one_edge(
     if len(second):
         raise RaptorError(
             f"the rim of {mould.name} shows a second edge, {abs(second[0]):.1f} l0 from the first: its wall "
-            "is seen as a band, or the tissue follows it closely; give --landmark at posts or corners"
+            "is visible as a band, or the tissue follows it closely; give --landmark at posts or corners"
         )
 
 
@@ -226,12 +226,12 @@ def _edge_offsets(
     curvature = left - 2 * middle + right
     shift = np.where(curvature < 0, 0.5 * (left - right) / np.where(curvature < 0, curvature, 1.0), 0.0)
     offsets = along[top] + np.clip(shift, -1, 1) * step
-    ends = (top == 1) | (top == slope.shape[1] - 2)  # still rising at the end: not this edge
+    ends = (top == 1) | (top == slope.shape[1] - 2)  # still rising at the end: another edge
     return np.where((middle > least) & ~ends, offsets, np.nan)
 
 
 def _fit(registration: Registration, edges: Edges, offsets: NDArray[np.float64]) -> Registration:
-    """The similarity that brings the edge points to the edges found, robustly."""
+    """The similarity that moves the edge points onto the edges found, by a robust fit."""
     there = np.isfinite(offsets)
     if there.sum() < 8:
         return registration

@@ -18,21 +18,23 @@ from raptor.imaging.pictures import Picture
 from raptor.imaging.registration import Registration
 from raptor.moulds import Mould
 
-MARGIN = 0.25, 4.0  # l0, and pixels, by rim and tethers that are not read: shadow and blur reach so far
-SMOOTHING = 0.12  # l0, Gaussian, at least a pixel
+MARGIN = 0.25, 4.0  # l0 and pixels along rim and tethers that are not read, because of shadow and blur
+SMOOTHING = 0.12  # l0, Gaussian, at least one pixel
 SPECK = 0.005  # of the depression's area: smaller pieces and holes are noise
-RIM_SHADOW = 0.5  # l0 outside the rim that is not taken for plate
-GRAIN = 0.01  # l0^2: smaller rings of a contour are not even looked at
-ROUNDS = 6  # of splitting the surfaces and fitting the light to them
-DEGREE = 4  # of the light's polynomial, where surfaces are known everywhere
-MIN_CONTRAST = 4.0  # standard deviations; halves of noise differ by 2.7, of an even spread by 3.5
-RIM_BAND = 1.5  # l0 along the rim, where a tissue that contracts leaves the floor bare
-MAX_OUTSIDE = 0.05  # of a mask's tissue
-PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the two is tissue shows later
+RIM_SHADOW = 0.5  # l0 outside the rim that does not count as plate
+GRAIN = 0.01  # l0^2; smaller rings of a contour are ignored
+ROUNDS = 6  # of splitting the surfaces and fitting the illumination
+DEGREE = 4  # of the illumination's polynomial, where surfaces are known everywhere
+MIN_CONTRAST = (
+    4.0  # standard deviations; the halves of Gaussian noise differ by 2.7, of a uniform spread by 3.5
+)
+RIM_BAND = 1.5  # l0 along the rim, where a contracting tissue leaves the floor bare
+MAX_OUTSIDE = 0.05  # share of a mask's tissue
+PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the last two is tissue is decided later
 
 
 class Appearance(StrEnum):
-    """How the tissue looks beside the floor of the depression."""
+    """Brightness of the tissue compared with the floor of the depression."""
 
     BRIGHT = "bright"
     DARK = "dark"
@@ -40,7 +42,7 @@ class Appearance(StrEnum):
 
 
 def appearance_named(name: str) -> Appearance:
-    """The look of a name; raises a RaptorError for another than bright, dark and auto."""
+    """The appearance of a name; raises a RaptorError unless it is bright, dark or auto."""
     try:
         return Appearance(name)
     except ValueError:
@@ -49,25 +51,25 @@ def appearance_named(name: str) -> Appearance:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured.
+    """A measured tissue and how it was found.
 
     Parameters
     ----------
     outline : shapely.Geometry
         The tissue, a Polygon or MultiPolygon, l0.
     area_ratio, width_ratio : float
-        A/A0 and w/w0; w/w0 is NaN where the central section meets no depression.
+        A/A0 and w/w0; w/w0 is NaN if the central section misses the depression.
     threshold : float
-        Brightness that parts tissue and floor: over that of the plate, uneven light taken out;
-        0.5 for a mask.
+        Brightness between tissue and floor, over that of the plate, illumination removed; 0.5 for a
+        mask.
     tissue : Appearance
         Bright or dark.
     contrast : float
         Difference of tissue and floor, in standard deviations within them; NaN for a mask.
     brightness : array (row, column)
-        What was compared with the threshold.
+        The values compared with the threshold.
     read : array (row, column)
-        The pixels of the depression that the threshold was chosen from.
+        The pixels of the depression from which the threshold was chosen.
     registration : Registration
     """
 
@@ -91,13 +93,13 @@ def measure(
 ) -> Measurement:
     """Outline, area and width of the tissue in a picture registered to its mould.
 
-    A threshold that is not given is Otsu's (1979), among the depression's pixels.
+    The default threshold is Otsu's (1979), over the depression's pixels.
 
     Raises
     ------
     RaptorError
-        Where the depression lies outside the picture, no tissue is found, tissue and floor cannot be
-        told apart, the threshold is not among the brightnesses seen, or a mask leaves the depression.
+        If the depression lies outside the picture, no tissue is found, tissue and floor cannot be told
+        apart, no pixel lies on one side of the threshold, or a mask leaves the depression.
     """
     size = picture.values.shape
     margin = max(MARGIN[0], MARGIN[1] / registration.scale)
@@ -108,7 +110,7 @@ def measure(
     if picture.mask:
         tissue = Appearance.BRIGHT if tissue is Appearance.AUTO else tissue
         if threshold is not None:
-            raise RaptorError("the image is a mask of two values; leave --threshold away")
+            raise RaptorError("the image is a two-valued mask; drop --threshold")
         brightness, level, contrast = picture.values, 0.5, float("nan")
     else:
         corrected = even_brightness(picture.values, mould, registration, inside)
@@ -121,15 +123,15 @@ def measure(
     outline = _outline(brightness, level, tissue, registration)
     if picture.mask:
         _require_inside(outline, mould)
-    # What a tether parts from the rest is no speck.
+    # A piece that only a tether separates from the rest is no speck.
     joined = shapely.union_all([outline.intersection(mould.outline), *(t.polygon for t in mould.tethers)])
     joined = without_specks(joined, SPECK * mould.depression.area)
     parts = shapely.get_parts(joined.intersection(mould.depression))
     outline = shapely.union_all(parts[shapely.area(parts) > 0])  # where two tethers touch, a line is left
     if outline.area < SPECK * mould.depression.area:
         raise RaptorError(
-            f"no tissue is found at threshold {level:.3g} ({tissue.value} tissue); "
-            "look at --threshold and --tissue"
+            f"no tissue found at threshold {level:.3g} ({tissue.value} tissue); "
+            "check --threshold and --tissue"
         )
     area, width = outline_ratios(outline, mould)
     return Measurement(outline, area, width, level, tissue, contrast, brightness, inside, registration)
@@ -138,10 +140,10 @@ def measure(
 def even_brightness(
     values: NDArray[np.float64], mould: Mould, registration: Registration, inside: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Brightness (row, column) over that of the plate, with uneven light taken out.
+    """Brightness (row, column) over that of the plate, uneven illumination removed.
 
-    `inside` (row, column) is what may be read of the depression; it is split in two surfaces, and
-    these and the plate are fitted together with the light, again and again.
+    The readable part of the depression, `inside` (row, column), is split into two surfaces, which are
+    fitted with the plate and the illumination, in alternation.
     """
     log = log_brightness(values, max(1.0, SMOOTHING * registration.scale))
     plate, flat, _ = find_plate(log)
@@ -156,7 +158,7 @@ def even_brightness(
 
 
 def without_specks(shape: shapely.Geometry, least: float) -> shapely.Geometry:
-    """The shape without pieces and holes of less than an area, l0^2."""
+    """The shape without pieces and holes smaller than `least`, l0^2."""
     pieces = [piece for piece in shapely.get_parts(shape) if piece.area >= least]
     return shapely.union_all(
         [
@@ -171,7 +173,7 @@ def _smooth_within(
 ) -> NDArray[np.float64]:
     """Gaussian average over the pixels inside (normalised convolution: Knutsson and Westin 1993).
 
-    So what lies beyond rim and tethers does not count; there, the nearest average goes on.
+    Pixels beyond rim and tethers do not contribute; there the nearest average is extended.
     """
     blur = partial(gaussian_filter, sigma=sigma, mode="constant", truncate=4.0)
     weight = blur(inside.astype(float))
@@ -182,43 +184,41 @@ def _smooth_within(
 
 
 def _threshold(seen: NDArray[np.float64], given: float | None) -> tuple[float, float]:
-    """The threshold, and the contrast of what lies on its two sides."""
+    """The threshold, and the contrast between its two sides."""
     level = float(threshold_otsu(seen)) if given is None else given
     above = seen > level
     if above.all() or not above.any():
         raise RaptorError(
-            f"threshold is {level:.3g}; brightness in the depression goes from {seen.min():.3g} to "
-            f"{seen.max():.3g} of the plate's, so choose between"
+            f"threshold is {level:.3g}; brightness in the depression runs from {seen.min():.3g} to "
+            f"{seen.max():.3g} of the plate's; choose a value between"
         )
     within = np.sqrt(above.mean() * seen[above].var() + (~above).mean() * seen[~above].var())
     contrast = float((seen[above].mean() - seen[~above].mean()) / within)
     if given is None and contrast < MIN_CONTRAST:
         raise RaptorError(
-            f"tissue and floor cannot be told apart: their contrast is {contrast:.1f} standard deviations, "
-            f"{MIN_CONTRAST} are needed; light them better, give a mask, or set --threshold"
+            f"tissue and floor cannot be told apart: their contrast is {contrast:.1f} standard deviations "
+            f"({MIN_CONTRAST} are needed); improve the lighting, give a mask, or set --threshold"
         )
     return level, contrast
 
 
 def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.bool_]) -> Appearance:
-    """Bright or dark: the floor is what lies along the rim more than elsewhere."""
+    """Bright or dark: the floor is the surface more frequent along the rim than elsewhere."""
     along, elsewhere = float(above[band].mean()), float(above[inside & ~band].mean())
     if abs(along - elsewhere) < 0.1 * max(along, elsewhere):
-        raise RaptorError(
-            "it cannot be seen which surface is the tissue; give --tissue bright or --tissue dark"
-        )
+        raise RaptorError("cannot tell which surface is the tissue; give --tissue bright or --tissue dark")
     return Appearance.DARK if along > elsewhere else Appearance.BRIGHT
 
 
 def _outline(
     brightness: NDArray[np.float64], level: float, tissue: Appearance, registration: Registration
 ) -> shapely.Geometry:
-    """What lies on the tissue's side of a level, as polygons in l0 between pixels."""
+    """The region on the tissue's side of a level, as polygons in l0 with sub-pixel precision."""
     signed = (brightness - level) * (1 if tissue is Appearance.BRIGHT else -1)
     signed = np.pad(signed, 1, constant_values=-float(np.abs(signed).max()))
     rings = [registration.to_mould(ring[:, ::-1] - 1) for ring in find_contours(signed, 0.0) if len(ring) > 3]
     shapes = [shape for ring in rings if (shape := shapely.Polygon(ring).buffer(0)).area > GRAIN]
-    # Contours do not cross, so a ring within a ring is a hole, and one within a hole a piece.
+    # Contours do not cross: a ring inside a ring is a hole, and a ring inside a hole is a piece.
     return reduce(shapely.symmetric_difference, shapes, shapely.Polygon())
 
 
@@ -231,7 +231,7 @@ def _require_in_picture(
     if reach > 1 or np.count_nonzero(inside) < 100:
         raise RaptorError(
             f"{mould.name} does not lie in the image as registered, or covers too few pixels; "
-            "show all of it, larger, or look at the landmarks"
+            "show all of it, larger, or check the landmarks"
         )
 
 
@@ -239,6 +239,6 @@ def _require_inside(outline: shapely.Geometry, mould: Mould) -> None:
     outside = outline.difference(mould.outline).area / max(outline.area, 1e-9)
     if outside > MAX_OUTSIDE:
         raise RaptorError(
-            f"{100 * outside:.0f} % of the mask lies outside the depression of {mould.name}, at most "
-            f"{100 * MAX_OUTSIDE:.0f} % may; look at the registration and at --tissue"
+            f"{100 * outside:.0f} % of the mask lies outside the depression of {mould.name} (at most "
+            f"{100 * MAX_OUTSIDE:.0f} % may); check the registration and --tissue"
         )

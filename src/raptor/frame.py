@@ -1,4 +1,4 @@
-"""The frame: the square image that every mould stands in, and its pixel grid. Lengths in l0."""
+"""The frame: the square image that contains every mould, and its pixel grid. Lengths in l0."""
 
 import numpy as np
 from numpy.typing import NDArray

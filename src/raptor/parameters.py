@@ -44,7 +44,7 @@ def largest_kappa_nnnn(kappa_nnn: float) -> float:
 
 @dataclass(frozen=True)
 class CellParameters:
-    """What the cells and the matrix are made of.
+    """Parameters of the cells and the matrix.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class CellParameters:
     Raises
     ------
     RaptorError
-        Where a value is outside what the model can simulate.
+        If a value is outside the range that the model can simulate.
     """
 
     delta: float
@@ -77,7 +77,7 @@ class CellParameters:
         Raises
         ------
         RaptorError
-            Where a parameter lies outside the box that sampling, prediction and fitting keep to.
+            If a parameter lies outside the box used for sampling, prediction and fitting.
         """
         for name, bounds in (
             ("delta", DELTA),
@@ -88,7 +88,7 @@ class CellParameters:
             if not bounds.lower <= value <= bounds.upper:
                 raise RaptorError(
                     f"{where}: {name} is {value}; it must lie between {bounds.lower} and "
-                    f"{bounds.upper}, the range that training covers"
+                    f"{bounds.upper}, the range covered by training"
                 )
         largest = largest_kappa_nnnn(self.kappa_nnn)
         if self.kappa_nnnn > largest * (1 + 1e-12):
@@ -100,12 +100,12 @@ class CellParameters:
 
 
 def require_parameters(cells: CellParameters) -> CellParameters:
-    """Return what is given if it is parameters, else raise.
+    """Return the argument if it is CellParameters, else raise.
 
     Raises
     ------
     RaptorError
-        Where it is anything else.
+        If it is anything else.
     """
     if not isinstance(cells, CellParameters):
         raise RaptorError(

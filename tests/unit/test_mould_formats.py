@@ -210,7 +210,7 @@ def test_scale_of_a_geojson_and_of_a_png(tmp_path):
     assert wide.outline.bounds[2] - wide.outline.bounds[0] == pytest.approx(80 * 62.5 / 300, abs=0.1)
     scaled = read_mould(tmp_path / "wide.png", 0.25)
     assert np.allclose(scaled.outline.bounds, (-10, -5, 10, 5))
-    with pytest.raises(RaptorError, match=r"x 40 l0 at 1 l0 a pixel.*scale of 0.7\d+ or less"):
+    with pytest.raises(RaptorError, match=r"x 40 l0 at 1 l0 per pixel.*scale of 0.7\d+ or less"):
         read_mould(tmp_path / "wide.png", 1.0)
     with pytest.raises(RaptorError, match="positive number of l0"):
         read_mould(tmp_path / "wide.png", -1.0)
@@ -237,7 +237,7 @@ def test_a_drawing_without_cells(tmp_path):
         (BOX + '<circle id="post7" r="0.1"/>', FRAME, "tether 'post7' is too thin"),
         (BOX + '<rect id="r" x="-20" y="-10" width="40" height="20"/>', FRAME, "cover the depression"),
         ('<rect x="-40" y="-5" width="80" height="9"/>', FRAME, "outside the image"),
-        (BOX, "", "give --scale, in l0 a user unit"),
+        (BOX, "", "give --scale, in l0 per user unit"),
         (BOX, 'data-l0="ten"', "data-l0 is 'ten'"),
         (BOX, 'data-l0="3"', "scale of 1.56 or less"),
         (BOX + '<path id="p" d="M 0 0 L 3 foo"/>', FRAME, "<path> 'p' cannot be read"),
@@ -254,8 +254,8 @@ def test_a_bad_svg_is_named(tmp_path, content, attributes, message):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"", "is empty"), (b"hello", "is not SVG"), (svg(BOX).encode()[:-20], "is cut short"),
-     (b"<html></html>", "its root is <html>"), (b"<svg xmlns='x'/>", "has not the namespace"),
+    [(b"", "is empty"), (b"hello", "is not SVG"), (svg(BOX).encode()[:-20], "is truncated"),
+     (b"<html></html>", "its root is <html>"), (b"<svg xmlns='x'/>", "lacks the namespace"),
      (b"\x89PNG\r\n\x1a\n", "is not SVG")],
 )  # fmt: skip
 def test_a_file_that_is_no_svg(tmp_path, content, message):
@@ -284,7 +284,7 @@ BODY = ((20, 80), (20, 80), BLACK)
     [
         (picture(), "shows no depression"),
         (picture(((20, 80), (20, 80), RED)), "shows no depression"),
-        (picture(((20, 80), (20, 80), WHITE), background=BLACK), "dark all along its edge"),
+        (picture(((20, 80), (20, 80), WHITE), background=BLACK), "dark all along its border"),
         (
             picture(((10, 40), (10, 40), BLACK), ((60, 90), (60, 90), BLACK)),
             r"shows 2 dark pieces .column \d4, row \d4 and",
@@ -305,7 +305,7 @@ def test_a_file_that_is_no_png(tmp_path):
     path = tmp_path / "bad.png"
     for content in (b"hello", whole[:1000], whole[:20], svg(BOX).encode()):
         path.write_bytes(content)
-        with pytest.raises(RaptorError, match="is not PNG, or is cut short"):
+        with pytest.raises(RaptorError, match="is not PNG, or is truncated"):
             read_mould(path)
 
 

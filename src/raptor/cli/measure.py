@@ -8,30 +8,30 @@ import typer
 
 from raptor.cli.options import Json, Scale, require_writable
 
-Picture = Annotated[Path, typer.Argument(help="photograph, or mask of two values (PNG, TIFF, JPEG)")]
-Look = Annotated[str, typer.Option("--tissue", help="bright, dark or auto: how it looks beside the floor")]
+Picture = Annotated[Path, typer.Argument(help="photograph, or two-valued mask (PNG, TIFF, JPEG)")]
+Look = Annotated[str, typer.Option("--tissue", help="bright, dark or auto: the tissue against the floor")]
 Threshold = Annotated[
-    float | None, typer.Option(help="brightness that parts tissue and floor, over the plate's; Otsu's")
+    float | None, typer.Option(help="brightness between floor and tissue, relative to the plate [Otsu's]")
 ]
 Landmarks = Annotated[
     list[str] | None,
-    typer.Option("--landmark", help='"column,row=x,y" or "column,row=tether 1"; twice or more'),
+    typer.Option("--landmark", help='"column,row=x,y" or "column,row=tether 1"; at least two'),
 ]
-Aligned = Annotated[bool, typer.Option("--aligned", help="the image is the mould's, 62.5 l0 wide")]
+Aligned = Annotated[bool, typer.Option("--aligned", help="the image is the frame, 62.5 l0 wide")]
 Mirrored = Annotated[bool, typer.Option("--mirrored", help="taken from below or in a mirror")]
 
 
 def measure(
     image: Picture,
-    mould: Annotated[Path, typer.Option(help="mould: GeoJSON, SVG or PNG (docs/moulds.md)")],
+    mould: Annotated[Path, typer.Option(help="mould by name, or a GeoJSON, SVG or PNG file")],
     scale: Scale = None,
     look: Look = "auto",
     threshold: Threshold = None,
     landmarks: Landmarks = None,
     aligned: Aligned = False,
     mirrored: Mirrored = False,
-    overlay: Annotated[Path | None, typer.Option(help="PNG to write, to check by eye")] = None,
-    outline: Annotated[Path | None, typer.Option(help="GeoJSON of the tissue's outline, in l0")] = None,
+    overlay: Annotated[Path | None, typer.Option(help="PNG to check by eye")] = None,
+    outline: Annotated[Path | None, typer.Option(help="GeoJSON of the outline, in l0")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask.

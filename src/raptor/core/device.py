@@ -1,4 +1,4 @@
-"""Where work is done: on the processor, or on a GPU where torch sees one."""
+"""The device that computes: the processor, or a GPU if torch sees one."""
 
 import shutil
 from typing import Literal, get_args
@@ -9,15 +9,15 @@ Device = Literal["auto", "cpu", "cuda"]
 
 
 def chosen_device(name: str, gpus: int = 1) -> str:
-    """Turn auto, cpu or cuda into cpu or cuda; torch is imported only where there may be a GPU.
+    """Resolve auto, cpu or cuda to cpu or cuda; imports torch only if there may be a GPU.
 
-    `gpus` is how many a job was given: with none, auto is the processor, whatever the machine has, so that
-    jobs side by side do not all take the same GPU, or some of them one and others none.
+    `gpus` is the number that a job was given. With none, auto is the processor even on a machine with a GPU,
+    so that parallel jobs do not compete for it and all use the same kind of device.
 
     Raises
     ------
     RaptorError
-        Where there is no such device, or a GPU is asked for and not seen.
+        If the name is unknown, or a GPU is requested and not found.
     """
     if name not in get_args(Device):
         raise RaptorError(f"device is '{name}'; allowed are {', '.join(get_args(Device))}")

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Files are read with clear errors and written atomically: whole or not at all."""
 
 import errno
 import os
@@ -11,14 +11,14 @@ from raptor.core.errors import RaptorError
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`; on success it is flushed to disk and takes its name.
+    """Yield a temporary path beside `path`; on success it is flushed to disk and renamed to `path`.
 
-    Two writers of one file are both harmless: each has a temporary file of its own.
+    Two writers of one file do no harm: each has its own temporary file.
 
     Raises
     ------
     RaptorError
-        Where the disk is full or the place cannot be written.
+        If the disk is full or the folder cannot be written.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp{path.suffix}")
@@ -31,12 +31,12 @@ def atomic_path(path: Path) -> Iterator[Path]:
     except RaptorError:
         raise
     except Exception as error:
-        # netCDF and torch report a full disk as errors of their own kinds.
+        # netCDF and torch report a full disk as their own kinds of error.
         full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT) or _is_full(path.parent)
         if full:
             raise RaptorError(
                 f"no room left on the disk for {path}; free some space and run the same command "
-                "again: what is finished is kept"
+                "again: finished files are kept"
             ) from error
         if isinstance(error, OSError):
             raise RaptorError(f"{path} cannot be written: {error}") from error
@@ -46,12 +46,12 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def read_input(path: Path, what: str, expected: str) -> bytes:
-    """Content of a file that a user gives; messages call it `what` and say what is `expected` in it.
+    """Content of a user's file; messages call it `what` and say what is `expected` in it.
 
     Raises
     ------
     RaptorError
-        Where it does not exist, is no file, cannot be read or is empty.
+        If it does not exist, is a folder, cannot be read or is empty.
     """
     path = Path(path)
     if path.is_dir():
@@ -68,7 +68,7 @@ def read_input(path: Path, what: str, expected: str) -> bytes:
 
 
 def _is_full(folder: Path) -> bool:
-    """Whether the disk is out of room; libraries such as HDF5 do not say so themselves."""
+    """Whether the disk is full; libraries such as HDF5 do not report it."""
     try:
         status = os.statvfs(folder)
     except OSError:

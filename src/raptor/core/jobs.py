@@ -1,4 +1,4 @@
-"""What every long-running job needs: a log file, a progress bar, errors in one sentence."""
+"""Common parts of long-running jobs: a log file, a progress bar, errors in one sentence."""
 
 import logging
 import sys

@@ -5,7 +5,7 @@ from importlib.metadata import version
 __version__ = version("raptor-tissue")
 
 MODEL_VERSION = 2
-"""Raised whenever a change of code changes results: it travels in rule parameters and in files."""
+"""Raised when a code change alters results; part of rule parameters and of every file."""
 
 STACK_FORMAT = 2
-"""Raised whenever the layout of field stacks changes: they are then built again, from the same shards."""
+"""Raised when the layout of field stacks changes; they are then rebuilt from the same shards."""

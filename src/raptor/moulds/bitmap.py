@@ -1,7 +1,7 @@
 """Moulds painted as PNG: white is outside, black or grey the depression, red a tether (docs/moulds.md).
 
-Walls run where a pixel would be half of one colour and half of the other, so that soft (anti-aliased)
-edges are read more finely than to a pixel. White spots within the depression are tethers, too.
+Walls run where a pixel would be half of one colour and half of the other, so soft (anti-aliased) edges give
+sub-pixel precision. White spots within the depression are tethers too.
 """
 
 import struct
@@ -20,25 +20,25 @@ from raptor.core.files import read_input
 from raptor.moulds.drawing import Drawing, Page
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
-WHITE = 0.9  # lightness, of 1, from which on a pixel is outside
-TINT = 0.3  # how far, of 1, green and blue may differ or exceed red
-RED = 0.25  # how far, of 1, red exceeds green and blue in a tether
-TOLERANCE = 0.5  # pixels; how far a simplified wall may leave the contour
-BLUR = 1.0  # pixels; how far drawing programs leave a wall from where it was meant
+WHITE = 0.9  # lightness, out of 1, from which a pixel is outside
+TINT = 0.3  # largest difference of green and blue, or excess over red, out of 1
+RED = 0.25  # least excess of red over green and blue in a tether, out of 1
+TOLERANCE = 0.5  # pixels; largest distance of a simplified wall from the contour
+BLUR = 1.0  # pixels; precision to which drawing programs place a wall
 MOST_PIXELS = 4096  # along a side
-# Pillow tells of damage by exceptions of many kinds.
+# Pillow reports damage by many kinds of exceptions.
 DAMAGE = (
     OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError,
 )  # fmt: skip
 
 
 def read_bitmap(path: Path, scale: float | None = None) -> Mould:
-    """Read a PNG file that holds one mould; `scale` is l0 a pixel.
+    """Read a PNG file that holds one mould; `scale` is l0 per pixel.
 
     Raises
     ------
     RaptorError
-        Where the file is not PNG, shows no depression or several, or the mould cannot be cast.
+        If the file is not PNG, shows no depression or several, or the mould cannot be cast.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -50,28 +50,28 @@ def read_bitmap(path: Path, scale: float | None = None) -> Mould:
 
 
 def _colours(content: bytes, where: str) -> NDArray[np.float64]:
-    """Red, green and blue of a picture (row, column, 3), 0 to 1, on white where it is transparent."""
+    """Red, green and blue of a picture (row, column, 3), 0 to 1, on a white background."""
     try:
         picture = Image.open(BytesIO(content), formats=["PNG"])
         if max(picture.size) > MOST_PIXELS:
             raise RaptorError(
-                f"{where} is {picture.width} x {picture.height} pixels large; make it at most "
-                f"{MOST_PIXELS} a side (1,000 are plenty)"
+                f"{where} is {picture.width} x {picture.height} pixels; reduce it to at most "
+                f"{MOST_PIXELS} per side (1,000 are enough)"
             )
-        if picture.mode.startswith("I"):  # 16 bits of grey
+        if picture.mode.startswith("I"):  # 16-bit grey
             grey = np.asarray(picture, dtype=np.float64) / 65535
             return np.repeat(grey[..., None], 3, axis=2)
         layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
     except RaptorError:
         raise
     except DAMAGE as error:
-        raise RaptorError(f"{where} is not PNG, or is cut short: {error}; save it again as PNG") from error
+        raise RaptorError(f"{where} is not PNG, or is truncated: {error}; save it again as PNG") from error
     opacity = layers[..., 3:]
     return np.asarray(layers[..., :3] * opacity + 1 - opacity)
 
 
 def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, list[tuple[str, Tether]]]:
-    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their places."""
+    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their positions."""
     _require_known(colours, where)
     light, redness = colours.min(axis=2), colours[..., 0] - colours[..., 1:].max(axis=2)
     grey = light[(light < WHITE) & (redness < RED)]
@@ -82,8 +82,8 @@ def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, l
     rim = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
     if (rim < WHITE).all():
         raise RaptorError(
-            f"{where} is dark all along its edge; outside is white and the depression dark, so invert the "
-            "colours, or leave a white rim"
+            f"{where} is dark all along its border; outside is white and the depression dark, so invert the "
+            "colours, or leave a white border"
         )
     reds = redness[redness >= RED]
     red = _regions(redness - np.median(reds) / 2) if reds.size else []
@@ -93,7 +93,7 @@ def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, l
         places = " and ".join(_place(part) for part in sorted(bodies, key=lambda part: -part.area)[:3])
         raise RaptorError(
             f"{where} shows {len(bodies)} dark pieces ({places}); a mould is one connected depression on "
-            "white, so join the pieces, or paint over what is none"
+            "white, so join the pieces, or paint stray ones white"
         )
     outline = shapely.Polygon(bodies[0].exterior).simplify(TOLERANCE)
     holes = [shapely.Polygon(ring) for ring in bodies[0].interiors]
@@ -101,7 +101,7 @@ def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, l
 
 
 def _require_known(colours: NDArray[np.float64], where: str) -> None:
-    """Raise a RaptorError that names a pixel which is neither white, grey nor red, nor between these."""
+    """Raise a RaptorError naming a pixel whose colour is not white, grey, red or a mixture of these."""
     red, green, blue = np.moveaxis(colours, 2, 0)
     strange = (np.abs(green - blue) > TINT) | (np.maximum(green, blue) - red > TINT)
     if strange.any():
@@ -121,7 +121,7 @@ def _regions(field: NDArray[np.float64]) -> list[shapely.Polygon]:
 
 
 def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> Tether:
-    """A painted region as a tether: a round post where it is round to half a pixel."""
+    """A painted region as a tether: a circle if it is round to half a pixel."""
     centre, radius = part.centroid, float(np.sqrt(part.area / np.pi))
     corners = shapely.get_coordinates(part)
     post = Circle(centre.x, centre.y, radius)
@@ -129,11 +129,11 @@ def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> Tether:
     if np.abs(reach - radius).max() < TOLERANCE and post.stands_in(outline):
         return post
     simple = part.simplify(TOLERANCE)
-    inside = simple.intersection(outline)  # a tether at the wall must not reach out by the tolerance
+    inside = simple.intersection(outline)  # simplification must not push a tether out through the wall
     return PolygonTether(inside if inside.geom_type == "Polygon" and not inside.is_empty else simple)
 
 
 def _place(part: shapely.Polygon) -> str:
-    """Where a region lies, for messages."""
+    """A region's position, for messages."""
     point = part.representative_point()
     return f"column {point.x:.0f}, row {-point.y:.0f}"

@@ -1,4 +1,4 @@
-"""A drawing of a mould, before its lengths are in l0: what SVG and PNG files have in common."""
+"""A drawing of a mould in its own units: what SVG and PNG files have in common."""
 
 from dataclasses import dataclass
 from math import floor, log10
@@ -13,12 +13,12 @@ from raptor.frame import IMAGE_SIZE
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether, require_standing
 
 ROW = 0.5  # l0; rows of sites of all layers, along x and along y
-LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this
+LARGEST_BLUR = 0.125  # l0; no wall is moved farther than this
 
 
 @dataclass(frozen=True)
 class Page:
-    """The square that stands for the frame of 62.5 l0: centre and side, drawing units, y up."""
+    """The square that represents the frame of 62.5 l0: centre and side, drawing units, y up."""
 
     x: float
     y: float
@@ -32,13 +32,13 @@ class Drawing:
     Parameters
     ----------
     outline : shapely.Polygon
-        The depression, without holes for the tethers.
+        The depression, tethers not cut out.
     tethers : tuple of (str, Tether)
-        Each with what messages call it.
+        Each with its name in messages.
     page : Page or None
-        None where the file does not say how large its page is.
+        None if the file does not give the size of its page.
     unit : str
-        What messages call a drawing unit.
+        Name of a drawing unit in messages.
     blur : float
         How finely the drawing tells where a wall is, drawing units. A corner nearer than this to a row of
         sites is put on it: sites on a wall hold no cell, and noise must not decide about a whole row.
@@ -53,13 +53,13 @@ class Drawing:
     def mould(self, path: Path, scale: float | None) -> Mould:
         """The mould drawn in the file `path`, lengths in l0.
 
-        With a scale (l0 a drawing unit) the middle of the outline's bounding box is the origin; without
+        With a scale (l0 per drawing unit) the centre of the outline's bounding box is the origin; without
         one the page is the frame.
 
         Raises
         ------
         RaptorError
-            Where the mould cannot be cast, or neither a scale nor a page says how large it is.
+            If the mould cannot be cast, or neither a scale nor a page gives its size.
         """
         try:
             x, y, unit = self._placement(scale)
@@ -69,7 +69,9 @@ class Drawing:
                 return _on_rows(shape.shifted(-x, -y).scaled(unit), blur)
 
             outline = placed(PolygonTether(self.outline)).polygon
-            Mould(outline, name=path.stem)  # so that tethers are held against a valid outline
+            Mould(
+                outline, name=path.stem
+            )  # raises for an invalid outline before tethers are compared with it
             tethers = tuple(placed(tether) for _, tether in self.tethers)
             for (called, _), tether in zip(self.tethers, tethers, strict=True):
                 require_standing(tether, outline, f"{path.stem}: {called}")
@@ -78,12 +80,12 @@ class Drawing:
             raise RaptorError(f"mould file {path}: {error}") from error
 
     def _placement(self, scale: float | None) -> tuple[float, float, float]:
-        """The origin (x, y) in drawing units, and l0 a drawing unit."""
+        """The origin (x, y) in drawing units, and l0 per drawing unit."""
         if scale is None and self.page is not None:
             return self.page.x, self.page.y, IMAGE_SIZE / self.page.side
         if scale is None:
             raise RaptorError(
-                f"it does not say how long a {self.unit} is; give --scale, in l0 a {self.unit}, or the "
+                f"it does not say how long a {self.unit} is; give --scale, in l0 per {self.unit}, or the "
                 "attribute data-l0 or viewBox"
             )
         x0, y0, x1, y1 = self.outline.bounds
@@ -91,7 +93,7 @@ class Drawing:
         if max(width, height) > IMAGE_SIZE * (1 + 1e-9):
             largest = _rounded_down(scale * IMAGE_SIZE / max(width, height))
             raise RaptorError(
-                f"the outline is {width:.4g} x {height:.4g} l0 at {scale:.4g} l0 a {self.unit}, and the "
+                f"the outline is {width:.4g} x {height:.4g} l0 at {scale:.4g} l0 per {self.unit}, and the "
                 f"frame is {IMAGE_SIZE} l0 wide; give a scale of {largest} or less"
             )
         return (x0 + x1) / 2, (y0 + y1) / 2, scale
@@ -106,12 +108,12 @@ def _on_rows(shape: Tether, blur: float) -> Tether:
         rows = np.rint(corners / ROW) * ROW
         return np.where(np.abs(corners - rows) <= blur, rows, corners)
 
-    # Corners that the picture had cut off meet again.
+    # Bevelled corners of the picture become corners again.
     moved = shapely.transform(shape.polygon, snapped).simplify(0.0)
     return PolygonTether(moved) if moved.is_valid and moved.area > 0 else shape
 
 
 def _rounded_down(value: float) -> str:
-    """A positive number to three digits, never above it."""
+    """A positive number rounded down to three digits."""
     step = 10.0 ** (floor(log10(value)) - 2)
     return f"{floor(value / step) * step:.3g}"

@@ -1,7 +1,7 @@
-"""Moulds that people cast: families of outlines with tethers as they are placed at the bench.
+"""Moulds as people make them: families of outlines with layouts of tethers.
 
 A mould is an outline of a family (`outlines`), at a drawn size, with a layout of tethers
-(`tether_layouts`), turned and shifted in the frame. What cannot be cast well is drawn again.
+(`tether_layouts`), rotated and shifted in the frame. Moulds that cannot be cast well are rejected.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ GAP = 1.5  # l0; least gap between two tethers
 
 
 class MouldFamilies(Block):
-    """What moulds that people cast are drawn from; lengths in l0."""
+    """The distribution of moulds as people make them; lengths in l0."""
 
     cells: tuple[Positive, Positive] = Field((1500, 14000), description="bounds of the number of cells")
     margin: float = Field(2.2, ge=2.2, le=20, description="rim of the image that stays free: 3 sigma or more")
@@ -57,12 +57,12 @@ class MouldFamilies(Block):
         return self
 
     def draw(self, rng: Generator, layers: int, name: str) -> tuple[Mould, str]:
-        """Draw one mould of so many layers and the name of its family.
+        """Draw one mould with the given number of layers; returns it with the name of its family.
 
         Raises
         ------
         RaptorError
-            Where no mould that meets all bounds was found in many attempts.
+            If many attempts found no mould that meets all bounds.
         """
         family = _weighted(rng, self.families)
         for _ in range(ATTEMPTS):
@@ -84,7 +84,7 @@ class MouldFamilies(Block):
         reach = IMAGE_SIZE / 2 - self.margin
         x0, y0, x1, y1 = (factor * bound for bound in outline.bounds)
         if max(x1 - x0, y1 - y0) > 2 * reach:
-            # As large as the frame takes: long moulds fill it.
+            # As large as the frame allows: long moulds fill it.
             factor *= 2 * reach / max(x1 - x0, y1 - y0) * rng.uniform(0.8, 1.0)
         outline = shapely.transform(outline, lambda xy: factor * xy)
         if not _wide_enough(outline):
@@ -103,20 +103,20 @@ class MouldFamilies(Block):
 
 
 def _weighted(rng: Generator, weights: dict[str, float]) -> str:
-    """A key, drawn by weight; the order of the keys does not matter."""
+    """A key drawn by weight, independent of the order of the keys."""
     names = sorted(weights)
     chances = np.array([weights[name] for name in names])
     return str(rng.choice(names, p=chances / chances.sum()))
 
 
 def _wide_enough(outline: shapely.Polygon) -> bool:
-    """Whether the outline has no neck that would be lost between two rows of cells."""
+    """Whether every neck of the outline is wide enough to hold rows of cells."""
     core = outline.buffer(-NARROWEST / 2)
     return bool(outline.is_valid and not core.is_empty and core.geom_type == "Polygon")
 
 
 def _standing(proposed: list[Tether], outline: shapely.Polygon) -> tuple[Tether, ...]:
-    """Those of the proposed tethers that stand in the outline, apart from those before them."""
+    """The proposed tethers that lie in the outline and clear of earlier ones."""
     kept: list[Tether] = []
     for tether in proposed:
         thin = tether.radius if isinstance(tether, Circle) else 1.01 * SMALLEST_TETHER
@@ -131,7 +131,7 @@ def _standing(proposed: list[Tether], outline: shapely.Polygon) -> tuple[Tether,
 def _placed(
     rng: Generator, outline: shapely.Polygon, tethers: tuple[Tether, ...], reach: float
 ) -> tuple[shapely.Polygon, tuple[Tether, ...]] | None:
-    """Turned and shifted: mostly along x or y about the centre, else anyhow; None where it does not fit."""
+    """Rotated and shifted, mostly centred along x or y, otherwise at random; None if it does not fit."""
     angle = float(rng.choice([0.0, 90.0]) if rng.random() < 0.65 else rng.uniform(0, 180))
     turned = rotate(outline, angle, origin=(0, 0))
     x0, y0, x1, y1 = turned.bounds
@@ -144,7 +144,7 @@ def _placed(
 
 
 def _moved(tether: Tether, angle: float, x: float, y: float) -> Tether:
-    """A tether turned by degrees about the origin, then shifted."""
+    """A tether rotated by degrees about the origin, then shifted."""
     if isinstance(tether, Circle):
         centre = rotate(shapely.Point(tether.x, tether.y), angle, origin=(0, 0))
         return Circle(centre.x + x, centre.y + y, tether.radius)

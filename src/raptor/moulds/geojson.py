@@ -1,4 +1,4 @@
-"""Mould files: GeoJSON, one feature a mould, tethers in its properties (see docs/data.md)."""
+"""Mould files: GeoJSON, one feature per mould, tethers in its properties (see docs/data.md)."""
 
 import json
 from collections.abc import Container, Iterable
@@ -17,12 +17,12 @@ PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area")
 
 
 def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
-    """Read the moulds of a FeatureCollection; with `only`, those of these ids.
+    """Read the moulds of a FeatureCollection, or those whose ids are in `only`.
 
     Raises
     ------
     RaptorError
-        Where the file is missing, empty, not GeoJSON, or a mould in it cannot be cast.
+        If the file is missing, empty or not GeoJSON, or a mould in it cannot be cast.
     """
     path = Path(path)
     text = read_input(path, "mould file", "a GeoJSON polygon").decode("utf-8", errors="replace")
@@ -51,7 +51,7 @@ def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
 
 
 def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mould]:
-    """The moulds that `read_moulds` reads, by id; raises as it does."""
+    """The moulds of `read_moulds` by id; raises the same errors."""
     return {mould.name: mould for mould in read_moulds(path, only)}
 
 
@@ -61,7 +61,7 @@ def read_geojson(path: Path) -> Mould:
     Raises
     ------
     RaptorError
-        As `read_moulds`, and where the file holds more than one feature.
+        As `read_moulds`, and if the file holds more than one feature.
     """
     moulds = read_moulds(path)
     if len(moulds) > 1:
@@ -73,7 +73,7 @@ def read_geojson(path: Path) -> Mould:
 
 
 def write_moulds(path: Path, moulds: Iterable[Mould]) -> None:
-    """Write moulds as a FeatureCollection, whole or not at all."""
+    """Write moulds as a FeatureCollection, atomically."""
     collection = {
         "type": "FeatureCollection",
         "description": "RAPTOR moulds; lengths in l0, origin at the image centre",
@@ -88,12 +88,12 @@ def _name(feature: dict[str, Any], path: Path) -> str:
 
 
 def from_feature(feature: dict[str, Any], path: Path = Path("GeoJSON")) -> Mould:
-    """A mould from a GeoJSON feature, as `Mould.as_feature` gives it; messages name the file `path`.
+    """A mould from a GeoJSON feature, the inverse of `Mould.as_feature`; messages name the file `path`.
 
     Raises
     ------
     RaptorError
-        Where it cannot be cast.
+        If it cannot be cast.
     """
     properties = feature.get("properties") or {}
     name = _name(feature, path)
@@ -123,7 +123,7 @@ def from_feature(feature: dict[str, Any], path: Path = Path("GeoJSON")) -> Mould
 
 
 def _require_known(properties: dict[str, Any], where: str) -> None:
-    """Raise a RaptorError for a mistyped property; those of other programs may stand beside ours."""
+    """Raise a RaptorError for a misspelt property; properties of other programs are ignored."""
     for key in set(properties) - set(PROPERTIES):
         near = get_close_matches(key.lower(), PROPERTIES, 1, 0.8)
         if near:
@@ -137,7 +137,7 @@ def _tether(entry: Any, what: str) -> Tether:
         try:
             values = [float(entry[key]) for key in ("x", "y", "radius")]
             if not all(map(isfinite, values)):
-                raise ValueError("every one must be finite")
+                raise ValueError("all must be finite")
             return Circle(*values)
         except (TypeError, ValueError) as error:
             raise RaptorError(f"{what}: x, y and radius must be numbers ({error})") from error

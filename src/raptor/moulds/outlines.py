@@ -1,4 +1,4 @@
-"""Outlines of the moulds that people cast, one function a family.
+"""Outlines of moulds as people make them, one function per family.
 
 Each draws its proportions from a generator and returns a simple polygon about the origin whose long side
 lies along x; its size is set by the caller. Sources of the shapes: rectangles and strips (Garvin 2003,
@@ -50,7 +50,7 @@ def rounded_rectangle(rng: Generator) -> shapely.Polygon:
 
 
 def pill(rng: Generator) -> shapely.Polygon:
-    """A stadium: two half circles and what joins them."""
+    """A stadium: a rectangle between two half circles."""
     half = 0.5 * (_aspect(rng) - 1.0)
     return shapely.LineString([(-half, 0), (half, 0)]).buffer(0.5, quad_segs=ARC)
 
@@ -168,7 +168,7 @@ OUTLINES: dict[str, Callable[[Generator], shapely.Polygon]] = {
 
 
 def irregular(rng: Generator, outline: shapely.Polygon, size: float) -> shapely.Polygon:
-    """The outline with each corner moved at random by a share of its width, as cutters and hands do."""
+    """The outline with each corner moved at random by a share of its width, as in cutting by hand."""
     corners = shapely.get_coordinates(outline.simplify(0.01))[:-1]
     x0, y0, x1, y1 = outline.bounds
     moved = corners + rng.normal(0.0, size * min(x1 - x0, y1 - y0), corners.shape)

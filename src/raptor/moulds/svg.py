@@ -1,7 +1,7 @@
-"""Moulds drawn as SVG: closed shapes, told apart by their names or by their size (docs/moulds.md).
+"""Moulds drawn as SVG: closed shapes, distinguished by name or by size (docs/moulds.md).
 
-A shape is a path, polygon, polyline, rectangle, circle or ellipse that is not hidden; strokes, fills, text,
-images and straight lines do not count. A path of several pieces is several shapes.
+A shape is a visible path, polygon, polyline, rectangle, circle or ellipse; strokes, fills, text, images and
+straight lines are ignored. A path of several pieces is several shapes.
 """
 
 import re
@@ -25,7 +25,7 @@ from raptor.moulds.geometry import CIRCLE_SEGMENTS, Circle, Mould, PolygonTether
 OUTLINE = ("outline", "depression")
 TETHER = ("tether", "post")
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-SMOOTH = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
+SMOOTH = 1e-4  # largest distance of a straightened curve from the drawn one, over the shape's longer side
 SHAPES = {
     "path": svgelements.Path,
     "polygon": svgelements.Polygon,
@@ -51,22 +51,22 @@ class _Shape:
 
     @property
     def size(self) -> float:
-        """Area of its convex hull: a shape that crosses itself has one, too."""
+        """Area of its convex hull, which a shape that crosses itself has too."""
         return float(self.polygon.convex_hull.area)
 
     @property
     def tether(self) -> Tether:
-        """The shape as a tether, exactly round where it was drawn round."""
+        """The shape as a tether; a drawn circle stays exactly round."""
         return self.circle or PolygonTether(self.polygon)
 
 
 def read_svg(path: Path, scale: float | None = None) -> Mould:
-    """Read an SVG file that holds one mould; `scale` is l0 a user unit.
+    """Read an SVG file that holds one mould; `scale` is l0 per user unit.
 
     Raises
     ------
     RaptorError
-        Where the file is not SVG, draws no outline or several, or the mould cannot be cast.
+        If the file is not SVG, draws no outline or several, or the mould cannot be cast.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -79,8 +79,8 @@ def read_svg(path: Path, scale: float | None = None) -> Mould:
     try:
         drawn = svgelements.SVG.parse(BytesIO(content), reify=False)
         if not isinstance(drawn, svgelements.SVG):
-            raise ValueError('the root has not the namespace xmlns="http://www.w3.org/2000/svg"')
-        # svgelements gives CSS pixels; lengths here are the file's own, and y goes up.
+            raise ValueError('the root lacks the namespace xmlns="http://www.w3.org/2000/svg"')
+        # svgelements gives CSS pixels; lengths here are the file's own, with y up.
         matrix = ~svgelements.Matrix(drawn.viewbox_transform or "") * svgelements.Matrix.scale(1, -1)
         shapes, page = list(_shapes(drawn, "", matrix)), _page(drawn, root)
     except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError) as error:
@@ -96,7 +96,7 @@ def _root(content: bytes, where: str) -> ElementTree.Element:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise RaptorError(
-            f"{where} is not SVG, or is cut short: {error}; save it again as plain SVG"
+            f"{where} is not SVG, or is truncated: {error}; save it again as plain SVG"
         ) from error
     if _tag(root) != "svg":
         raise RaptorError(f"{where} is not SVG: its root is <{_tag(root)}>; save it as plain SVG")
@@ -109,7 +109,7 @@ def _tag(element: ElementTree.Element) -> str:
 
 
 def _require_readable(element: ElementTree.Element, where: str) -> None:
-    """Raise a RaptorError for a shape that svgelements would drop, or cut short, without a word."""
+    """Raise a RaptorError for a shape that svgelements would silently drop or truncate."""
     tag, attributes = _tag(element), element.attrib
     if tag not in SHAPES:
         return
@@ -129,23 +129,23 @@ def _require_readable(element: ElementTree.Element, where: str) -> None:
         reason = f" ({error})" if str(error) else ""
         raise RaptorError(
             f"{where}: <{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; "
-            "draw it again, or take it out"
+            "draw it again, or delete it"
         ) from error
 
 
 def _unit(text: str, where: str) -> float:
-    """The value of the attribute data-l0: l0 a user unit."""
+    """The value of the attribute data-l0: l0 per user unit."""
     try:
         value = float(text)
     except ValueError:
         value = nan
     if not (isfinite(value) and value > 0):
-        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 a user unit")
+        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 per user unit")
     return value
 
 
 def _page(drawn: svgelements.SVG, root: ElementTree.Element) -> Page | None:
-    """The page: the viewBox, or else width and height where they are lengths."""
+    """The page: the viewBox, or else width and height if they are lengths."""
     box = drawn.viewbox
     if box is not None and None not in (box.x, box.y, box.width, box.height):
         x, y, width, height = box.x, box.y, box.width, box.height
@@ -159,7 +159,7 @@ def _page(drawn: svgelements.SVG, root: ElementTree.Element) -> Page | None:
 
 
 def _shapes(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Shape]:
-    """Closed shapes of an element and of those in it, moved by a matrix; names pass from groups to shapes."""
+    """Closed shapes of an element and its children, transformed; names pass from groups to shapes."""
     role = _role(element, role)
     if isinstance(element, (svgelements.Group, svgelements.Use)):
         for part in element:
@@ -167,12 +167,12 @@ def _shapes(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Sh
     elif isinstance(element, DRAWN):
         pieces = sorted(_pieces(element, role, matrix), key=lambda p: p.size, reverse=True)
         for number, piece in enumerate(pieces):
-            # What else a path called outline holds stands within its largest piece.
+            # The other pieces of a path called outline are tethers within its largest piece.
             yield replace(piece, role="tether") if number and role == "outline" else piece
 
 
 def _role(element: Any, inherited: str) -> str:
-    """What an element's id, class or Inkscape label calls it; else what its group is."""
+    """The role named by an element's id, class or Inkscape label, or else by its group's."""
     values = element.values
     for word in (element.id or "", *(values.get("class") or "").split(), values.get(LABEL) or ""):
         for role, beginnings in (("outline", OUTLINE), ("tether", TETHER)):
@@ -198,7 +198,7 @@ def _pieces(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Sh
 
 
 def _name(element: Any, polygon: shapely.Polygon) -> str:
-    """What messages call a shape: its id, or its kind and where it lies in the drawing."""
+    """A shape's name in messages: its id, or its kind and position in the drawing."""
     if element.id:
         return f"'{element.id}'"
     x, y = polygon.centroid.x, polygon.centroid.y
@@ -206,14 +206,14 @@ def _name(element: Any, polygon: shapely.Polygon) -> str:
 
 
 def _points(segment: Any) -> list[Any]:
-    """Points along a segment of a path, its start left out."""
+    """Points along a segment of a path, without its start."""
     if isinstance(segment, (svgelements.CubicBezier, svgelements.QuadraticBezier, svgelements.Arc)):
         return [segment.point(t) for t in np.linspace(0, 1, CIRCLE_SEGMENTS + 1)[1:]]
     return [] if segment.end is None else [segment.end]
 
 
 def _circle(element: Any, piece: Any) -> Circle | None:
-    """The circle that a piece draws, if it is one."""
+    """The circle that a piece draws, if any."""
     if not isinstance(element, (svgelements.Circle, svgelements.Ellipse)):
         return None
     arc = next(segment for segment in piece if isinstance(segment, svgelements.Arc))
@@ -223,13 +223,13 @@ def _circle(element: Any, piece: Any) -> Circle | None:
 
 
 def _told_apart(shapes: list[_Shape], where: str) -> tuple[_Shape, list[_Shape]]:
-    """The outline, and the tethers, which all other shapes are."""
+    """The outline, and all other shapes as tethers."""
     outlines = [shape for shape in shapes if shape.role == "outline"]
     if len(outlines) > 1:
         names = ", ".join(shape.name for shape in outlines)
         raise RaptorError(
             f"{where}: {len(outlines)} shapes are called outline ({names}); a mould is one connected "
-            "outline, so keep one and call what stands in it tether"
+            "outline, so keep one and name the shapes in it tether"
         )
     candidates = outlines or [shape for shape in shapes if shape.role != "tether"]
     if not candidates:

@@ -1,7 +1,7 @@
-"""Where people put the tethers of a mould: posts, bars, blocks and holes, one function a layout.
+"""Layouts of tethers as people place them: posts, bars, blocks and holes, one function per layout.
 
-Each takes a generator, the outline and its widest circle's radius, lengths in l0, and proposes tethers;
-the caller keeps those that stand in the outline with room between them (`families`).
+Each takes a generator, the outline and the radius of its largest inscribed circle (l0) and proposes
+tethers; the caller keeps those that fit in the outline with gaps between them (`families`).
 """
 
 from collections.abc import Callable

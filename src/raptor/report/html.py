@@ -1,6 +1,6 @@
-"""The report: one HTML file that can be read from the top, with every figure and number of a run inside.
+"""The report: one self-contained HTML file with every figure and number of a run.
 
-The text is a Jinja template; this module gives it the run's files and the ways to write numbers.
+The text is a Jinja template; this module gives it the run's files and formats numbers.
 """
 
 import base64
@@ -26,21 +26,21 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ".yaml": lambda path: yaml.safe_load(path.read_text()),
     ".md": lambda path: path.read_text(),
 }
-"""How tables and texts of a run are read, by suffix."""
+"""Readers of a run's tables and texts, by suffix."""
 NOTHING = "\N{EN DASH}"
-"""What stands in place of a number that there is not."""
-LARGE = 2**22  # bytes: no table that a page shows is larger
+"""Shown in place of a missing number."""
+LARGE = 2**22  # bytes; larger tables are not shown
 
 
 def write_report(path: Path, template: Path, folder: Path, files: Iterable[Path]) -> None:
-    """Write the report of the run in `folder` from the template and those of its files that are given.
+    """Write the report of the run in `folder` from the template and the given files of the run.
 
-    A part of the text whose files are not among them is left out.
+    Parts of the text whose files are not given are left out.
 
     Raises
     ------
     RaptorError
-        Where the template or a file cannot be read, or the template asks for what is not there.
+        If the template or a file cannot be read, or the template asks for a missing name.
     """
     given = [Path(file) for file in files]
     figures = {file.stem: picture(file) for file in given if file.suffix == ".png"}
@@ -59,7 +59,7 @@ def write_report(path: Path, template: Path, folder: Path, files: Iterable[Path]
 
 
 def render(template: str, content: Mapping[str, Any]) -> str:
-    """A template filled in; what it names and `content` does not have is an error.
+    """A rendered template; a name that `content` does not have is an error.
 
     Filters: `number` and `percent` (both take digits), `section` of a Markdown text.
     """
@@ -77,7 +77,7 @@ def picture(path: Path) -> str:
     Raises
     ------
     RaptorError
-        Where it cannot be read.
+        If it cannot be read.
     """
     try:
         content = base64.b64encode(path.read_bytes()).decode("ascii")
@@ -87,7 +87,7 @@ def picture(path: Path) -> str:
 
 
 def number(value: Any, digits: int = 2) -> str:
-    """A number with so many significant digits, thousands apart; a dash where there is none."""
+    """A number to some significant digits, with thousands separated; a dash if missing."""
     if value is None or isinstance(value, str) or not math.isfinite(value):
         return str(value) if isinstance(value, str) else NOTHING
     if isinstance(value, int):
@@ -102,14 +102,14 @@ def number(value: Any, digits: int = 2) -> str:
 
 
 def percent(share: Any, digits: int = 0) -> str:
-    """A share in per cent; a dash where there is none."""
+    """A share in per cent; a dash if missing."""
     if share is None or not math.isfinite(share):
         return NOTHING
     return f"{100 * share:.{digits}f} %"
 
 
 def section(markdown: str, heading: str) -> str:
-    """The text under a heading of a Markdown text, without what follows the next; empty without any."""
+    """The text under a heading of a Markdown text, up to the next; empty if there is none."""
     found = re.search(rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", markdown, re.MULTILINE | re.DOTALL)
     return " ".join(found[1].split()) if found else ""
 

@@ -26,12 +26,12 @@ from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floo
 from raptor.surrogate.bands import LEVELS, Bands, fit_scale
 from raptor.surrogate.baselines import Nearest, baseline, training_mean
 from raptor.surrogate.batches import ExampleSet
-from raptor.surrogate.calibration import Silhouette, calibrate, fit_edge
+from raptor.surrogate.calibration import Case, calibrate, fit_threshold
 from raptor.surrogate.costs import costs_of
 from raptor.surrogate.files import load, save, write_prediction
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
-from raptor.surrogate.out_of_distribution import DESCRIPTORS, Novelty, descriptors
+from raptor.surrogate.out_of_distribution import DESCRIPTORS, TrainingSet, descriptors
 from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS, Element
 from tests.small import CONFIG, MODEL
@@ -93,31 +93,31 @@ def test_descriptors_do_not_change_with_the_view_and_tell_a_bar_from_posts(stack
     assert named["longest_tether"] > 24 * 62.5 / 32
 
 
-def test_what_is_far_from_all_points_is_novel():
+def test_a_point_of_the_training_set_is_near_it_and_another_is_not():
     points = np.random.default_rng(0).normal(size=(500, 9)).astype(np.float32)
-    novelty = Novelty(points, 2.0)
-    assert novelty.distance(points[3].astype(np.float64)) == pytest.approx(0, abs=1e-6)
-    assert novelty.distance(np.full(9, 6.0)) > 3
+    training = TrainingSet(points, 2.0)
+    assert training.distance(points[3].astype(np.float64)) == pytest.approx(0, abs=1e-6)
+    assert training.distance(np.full(9, 6.0)) > 3
 
 
-def test_the_edge_of_softer_images_is_found():
+def test_the_threshold_of_softer_images_is_found():
     """Blurred tissues that fill less and less of a mould, at a threshold below half of their density."""
     mould = Mould(shapely.box(-20, -10, 20, 10))
     cast = CastMould(mould, 1, 128)
     x, y = np.meshgrid(pixel_centres(128), pixel_centres(128))
-    silhouettes = []
+    cases = []
     for part in (0.5, 0.6, 0.7, 0.8):
         sharp = 1 / (1 + np.exp(4 * np.maximum(np.abs(x) - 20 * part, np.abs(y) - 10 * part)))
         soft = gaussian_filter(sharp, 3.0)
         true = shape_ratios(sharp, cast, 0.3)
-        silhouettes.append(Silhouette(cast, true, soft, soft[None]))
-    edge = fit_edge(silhouettes, 0.3)
-    assert edge > 1.02
-    before, after = (np.mean([np.abs(s.error(e * 0.3)) for s in silhouettes]) for e in (1.0, edge))
+        cases.append(Case(cast, true, soft, soft[None]))
+    factor = fit_threshold(cases, 0.3)
+    assert factor > 1.02
+    before, after = (np.mean([np.abs(c.error(f * 0.3)) for c in cases]) for f in (1.0, factor))
     assert after < 0.5 * before
-    assert silhouettes[0].errors(0.3).shape == (3, 2)
-    same = [replace(s, true=shape_ratios(s.predicted, cast, 0.3)) for s in silhouettes]
-    assert fit_edge(same, 0.3) == pytest.approx(1, abs=5e-3)
+    assert (cases[0].deviation(0.3) == 0).all()
+    same = [replace(c, ratios=shape_ratios(c.density, cast, 0.3)) for c in cases]
+    assert fit_threshold(same, 0.3) == pytest.approx(1, abs=5e-3)
 
 
 def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogate, moulds, stack, tmp_path):
@@ -126,19 +126,19 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
     prediction = surrogate.examine(mould, sample.parameters)
     assert prediction.fields.shape == (8, 32, 32)
     assert prediction.field_bands.half.shape == (3, 8, 32, 32)
-    assert prediction.shape_bands.half.shape == (3, 2)
-    assert np.allclose(prediction.fields, surrogate.predict_mould(mould, sample.parameters), atol=1e-5)
+    assert prediction.ratio_bands.half.shape == (3, 2)
+    assert np.allclose(prediction.fields, surrogate.predict(mould, [sample.parameters])[0], atol=1e-5)
     for half in (False, True):
         folder = tmp_path / f"{half}"
         save(folder, surrogate, {"training": {"threads": 1}}, "id", half=half)
         again = load(folder).examine(mould, sample.parameters)
         near = 5e-3 if half else 1e-6
         assert np.abs(again.fields - prediction.fields).max() < near * np.abs(prediction.fields).max()
-        assert again.shape_bands.half == pytest.approx(prediction.shape_bands.half, rel=0.05)
+        assert again.ratio_bands.half == pytest.approx(prediction.ratio_bands.half, rel=0.05)
         assert again.distance == pytest.approx(prediction.distance)
         assert again.threshold == pytest.approx(prediction.threshold)
     assert prediction.threshold != pytest.approx(density_threshold(2, 32), rel=1e-3)
-    write_prediction(tmp_path / "p.nc", prediction, mould, sample.parameters)
+    write_prediction(tmp_path / "p.nc", prediction)
     with pytest.raises(RaptorError, match="not calibrated"):
         replace(surrogate, calibration=None).examine(mould, sample.parameters)
 

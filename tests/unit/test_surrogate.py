@@ -11,7 +11,8 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.examples import augment, training_scaling
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
-from raptor.moulds import Mould, mould_image
+from raptor.moulds import Mould
+from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters
 from raptor.surrogate.batches import ExampleSet, split_examples
 from raptor.surrogate.files import load, save
@@ -187,26 +188,24 @@ def model_folder(tmp_path):
 
 
 def test_a_saved_model_predicts_the_same(model_folder):
-    image = mould_image(BOX, 32)
     surrogate, again = load(model_folder), load(model_folder)
     parameters = [CellParameters(d, 0.5, 0.3) for d in (0.1, 0.9)]
-    a = surrogate.predict(image.depression, image.tethers, parameters, 190)
+    a = surrogate.predict(BOX, parameters)
     assert a.shape == (2, 8, 32, 32)
-    assert np.array_equal(a, again.predict(image.depression, image.tethers, parameters, 190))
+    assert np.array_equal(a, again.predict(again.cast(BOX), parameters))
     assert not np.array_equal(a[0], a[1])
 
 
 def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
     surrogate = load(model_folder)
-    masks = np.zeros((32, 32), bool)
     for parameters, message in (
         (CellParameters(0.99, 0.5, 0.3), "delta is 0.99; it must lie between 0.05 and 0.95"),
         (CellParameters(0.5, 0.2, 0.3), "kappa_nnnn is 0.3, above kappa_nnn"),
     ):
         with pytest.raises(RaptorError, match=message):
-            surrogate.predict(masks, masks, [parameters], 9)
-    with pytest.raises(RaptorError, match="takes 32 x 32"):
-        surrogate.predict(masks[1:], masks[1:], [], 9)
+            surrogate.predict(BOX, [parameters])
+    with pytest.raises(RaptorError, match="cast with 4 layers and 64 pixels; this model knows"):
+        surrogate.predict(CastMould(BOX, 4, 64), [])
     text = (model_folder / "model.json").read_text()
     (model_folder / "model.json").write_text(text.replace('"base_channels": 4', '"base_channels": 8'))
     with pytest.raises(RaptorError, match="does not fit the model"):

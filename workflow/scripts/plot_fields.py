@@ -18,7 +18,7 @@ with logged(snakemake.log[0]):
     (sample,) = read_samples(stack, [row])
     moulds = moulds_by_id(Path(snakemake.input.moulds))
     surrogate = load(Path(snakemake.input.weights).parent)
-    predicted = surrogate.predict(sample.depression, sample.tethers, [sample.parameters], sample.n_cells)[0]
+    predicted = surrogate.predict(moulds[sample.mould], [sample.parameters])[0]
     stacks = {"simulation": sample.fields, "prediction": predicted}
     save(fields_figure(stacks, moulds[sample.mould]), Path(snakemake.output.png).with_suffix(""))
     save_fields(Path(snakemake.output.data), stacks)

@@ -18,7 +18,7 @@ with logged(snakemake.log[0]):
     surrogate = load(Path(snakemake.input.weights).parent)
     pixels = surrogate.pixels
     stacks = {
-        "prediction": surrogate.predict_mould(mould, record.parameters),
+        "prediction": surrogate.predict(mould, [record.parameters])[0],
         "simulation": record_fields(record, pixels),
     }
     rows = [

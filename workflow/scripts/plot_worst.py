@@ -19,8 +19,8 @@ with logged(snakemake.log[0]):
     cases, stacks = [], {}
     samples = read_samples(stack, [row_of[number] for number in chosen["simulation"]])
     for sample, error in zip(samples, chosen["vrmse_density"], strict=True):
-        masks, p = (sample.depression, sample.tethers), sample.parameters
-        predicted = surrogate.predict(*masks, [p], sample.n_cells)[0]
+        p = sample.parameters
+        predicted = surrogate.predict(moulds[sample.mould], [p])[0]
         title = (
             f"{sample.mould}: VRMSE {error:.2f}\n$\\Delta$ {p.delta:.2f}, "
             f"$\\kappa$ {p.kappa_nnn:.2f}, {p.kappa_nnnn:.2f}"

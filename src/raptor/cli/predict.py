@@ -58,17 +58,17 @@ def predict(
     require_picture_writable(picture, mould, output)
     surrogate = load(model or SHIPPED)
     prediction = surrogate.examine(shape, parameters)
-    write_prediction(output, prediction, shape, parameters)
+    write_prediction(output, prediction)
     if picture is not None:
         from raptor.plotting import fields_figure, save_picture
 
         save_picture(fields_figure({"prediction": prediction.fields}, shape), picture)
-    (area, width), half = prediction.shape, prediction.shape_bands.half[-1]
+    (area, width), half = prediction.ratios, prediction.ratio_bands.half[-1]
     sentence = (
         f"{output}: A/A0 {area:.3f} +- {half[0]:.3f}, w/w0 {width:.3f} +- {half[1]:.3f} (95 % bands, "
         f"{surrogate.layers} layers)"
     )
-    if prediction.unlike:
+    if prediction.out_of_distribution:
         sentence += (
             "\nunlike the training set, so do not trust these bands, and simulate: "
             f"distance {prediction.distance:.1f}, disagreement {prediction.disagreement:.1f} (usual: below 1)"
@@ -76,6 +76,7 @@ def predict(
     numbers = {
         "output": output, "area_ratio": area, "area_ratio_band95": half[0], "width_ratio": width,
         "width_ratio_band95": half[1], "distance": prediction.distance,
-        "disagreement": prediction.disagreement, "unlike": prediction.unlike, "layers": surrogate.layers,
+        "disagreement": prediction.disagreement, "unlike": prediction.out_of_distribution,
+        "layers": surrogate.layers,
     }  # fmt: skip
     report(sentence, numbers, json)

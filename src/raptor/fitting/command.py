@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,9 @@ from raptor.fitting.targets import (
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 STARTS = 128
 POINTS = 128  # of the survey behind intervals
@@ -59,7 +61,7 @@ class Request:
     mould: Mould
     target: Target | Outline
     simulator: Simulator
-    surrogate: Surrogate | None
+    surrogate: "Surrogate | None"
     start: CellParameters | None
     by_simulator: bool
     simulations: int
@@ -165,7 +167,7 @@ def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
     return request.measure(request.simulated, request.simulator.measure(request.mould), request.threshold)
 
 
-def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:
+def _posterior(request: Request, surrogate: "Surrogate", target: Target) -> dict[str, Any]:
     """Intervals of the posterior, and whether the target can be reached."""
     seen = survey(surrogate, request.mould, POINTS, request.simulator.seed)
     summary = summarise(infer(seen, target, request.error or RATIO_ERROR, request.simulator.seed))

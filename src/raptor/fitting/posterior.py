@@ -16,7 +16,7 @@ their bounded plane.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,9 @@ from raptor.fitting.targets import PARAMETERS, Target, as_array, parameters_at, 
 from raptor.moulds.geometry import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
 from raptor.surrogate.bands import LEVELS
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 DENSE = 2**16  # points of the posterior
 BANDED = 32  # points of a survey at which bands are found
@@ -104,7 +106,7 @@ class Posterior:
         return np.asarray(order[np.minimum(found, len(order) - 1)])
 
 
-def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey:
+def survey(surrogate: "Surrogate", mould: Mould, points: int, seed: int) -> Survey:
     """Ask the surrogate about a mould's tissue at points (a power of two) that fill the region.
 
     Predictions are means over the images of D4, as those that bands were calibrated on; bands are found at
@@ -119,11 +121,11 @@ def survey(surrogate: Surrogate, mould: Mould, points: int, seed: int) -> Survey
     parameters = [parameters_at(unit) for unit in units]
     cast = surrogate.cast(mould)
     level = LEVELS.index(0.95)
-    bands = [surrogate.examine(cast, p).shape_bands.half[level] for p in parameters[:BANDED]]
+    bands = [surrogate.examine(cast, p).ratio_bands.half[level] for p in parameters[:BANDED]]
     values = []
     for start in range(0, points, TOGETHER):
         part = parameters[start : start + TOGETHER]
-        fields = surrogate.predict(cast.depression, cast.tethers, part, cast.n_cells)
+        fields = surrogate.predict(cast, part)
         values += [seen(each, cast, surrogate.threshold) for each in fields]
     return Survey(units, np.array(values), np.array(bands, dtype=float) / norm.ppf(0.975))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,16 @@ from raptor.fitting.targets import PARAMETERS, Target, as_array, surrogate_densi
 from raptor.moulds.geometry import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.raster import density_threshold
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 ERROR = 0.25  # l0; of an outline drawn on a photograph, a pixel of the paper's image
 SEARCHES = 3  # from points of their own: where a valley is flat, they end in different places
 
 
 def recover(
-    surrogate: Surrogate,
+    surrogate: "Surrogate",
     mould: Mould,
     density: NDArray[np.floating],
     truth: CellParameters,

@@ -6,7 +6,7 @@ lower bound and the upper one that kappa_nnn leaves it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 RATIOS = ("area_ratio", "width_ratio")
 PARAMETERS = ("delta", "kappa_nnn", "kappa_nnnn")
@@ -79,26 +81,25 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([strip.upper - strip.lower for strip in strips])
 
 
-def surrogate_measure(surrogate: Surrogate, mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
+def surrogate_measure(surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
     """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
     cast = surrogate.cast(mould)
     densities_of = surrogate_densities(surrogate, cast, averaged=averaged)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-        return np.array([surrogate.shape(density, cast) for density in densities_of(parameters)])
+        return np.array([surrogate.ratios(density, cast) for density in densities_of(parameters)])
 
     return measure
 
 
 def surrogate_densities(
-    surrogate: Surrogate, mould: Mould | CastMould, *, averaged: bool = False
+    surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False
 ) -> Callable[[Sequence[CellParameters]], Any]:
     """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate."""
     cast = surrogate.cast(mould)
 
     def densities(parameters: Sequence[CellParameters]) -> NDArray[np.float32]:
-        masks = (cast.depression, cast.tethers)
-        return surrogate.predict(*masks, parameters, cast.n_cells, averaged=averaged)[:, 0]
+        return surrogate.predict(cast, parameters, averaged=averaged)[:, 0]
 
     return densities
 

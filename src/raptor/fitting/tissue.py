@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import Fit, minimise
@@ -11,11 +11,13 @@ from raptor.fitting.simulator import ENOUGH, Simulator, measure_again
 from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import Target, surrogate_measure
 from raptor.moulds.geometry import Mould
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 
 def fit_tissue(
-    surrogate: Surrogate,
+    surrogate: "Surrogate",
     simulator: Simulator,
     mould: Mould,
     target: Target,

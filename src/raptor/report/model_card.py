@@ -1,7 +1,7 @@
 """The model card: what a surrogate was trained on, how wrong it is, and where not to trust it."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -9,8 +9,10 @@ from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.netcdf import REFERENCES
 from raptor.studies.evaluation import MEASURES, SHAPES
 from raptor.surrogate.bands import LEVELS
-from raptor.surrogate.inference import Surrogate
 from raptor.symmetry import FIELDS
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 TEMPLATE = """# Model card: {name}
 
@@ -41,7 +43,7 @@ from seed to seed of the simulator itself, where 1 is the best that any predicti
 {measures}
 
 Mean P is right by construction. A/A0 and w/w0: mean absolute errors {area:.4f} and {width:.4f}, tissue being
-where predicted density is above {edge:.3f} times the simulator's threshold.
+where predicted density is above {factor:.3f} times the simulator's threshold.
 
 ## Bands
 Calibrated on the validation split; share of the held-out simulations that they hold:
@@ -74,7 +76,7 @@ EXTRA = {
 def model_card(
     name: str,
     data: str,
-    surrogate: Surrogate,
+    surrogate: "Surrogate",
     description: Mapping[str, Any],
     history: pd.DataFrame,
     summary: Mapping[str, Any],
@@ -123,7 +125,7 @@ def model_card(
             ]
             for m in MEASURES
         ),
-        edge=1.0 if surrogate.calibration is None else surrogate.calibration.edge,
+        factor=1.0 if surrogate.calibration is None else surrogate.calibration.threshold_factor,
         area=bulk["area_ratio"]["mae"],
         width=bulk["width_ratio"]["mae"],
         levels=" | ".join(f"{100 * level:.0f} %" for level in LEVELS),

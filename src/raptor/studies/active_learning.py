@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -10,12 +11,14 @@ from raptor.dataset.design import DesignRules, Run
 from raptor.dataset.further import further_set
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import RandomMoulds
-from raptor.surrogate.bands import relative_spread
-from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.bands import disagreement
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 
 def enriched(
-    surrogate: Surrogate,
+    surrogate: "Surrogate",
     size: int,
     candidates: int,
     rules: DesignRules,
@@ -30,8 +33,8 @@ def enriched(
     runs, moulds = further_set("enriched", candidates, [], {}, rules, drawn, seed)
     disagreements = []
     for run, mould in zip(runs, moulds, strict=True):
-        fields, spread, _ = surrogate.ensemble(surrogate.cast(mould), run.parameters)
-        disagreements.append(relative_spread(spread, fields))
+        found = surrogate.ensemble(mould, run.parameters)
+        disagreements.append(disagreement(found.deviation, found.mean))
         on_progress(run.simulation)
     chosen = np.sort(np.argsort(disagreements)[::-1][:size])
     table = pd.DataFrame([{"mould": run.mould} | asdict(run.parameters) for run in runs])

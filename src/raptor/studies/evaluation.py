@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +16,11 @@ from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.surrogate.bands import LEVELS
-from raptor.surrogate.inference import Prediction, Surrogate
+from raptor.surrogate.prediction import Prediction
 from raptor.symmetry import FIELDS
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 MEASURES = (*BULK, "area_ratio", "width_ratio")
 SHAPES = ("area_ratio", "width_ratio")
@@ -46,13 +49,14 @@ def sample_measures(fields: NDArray[np.floating], cast: CastMould) -> dict[str, 
     return bulk_statistics(fields, cast.n_cells, cast.threshold) | shapes
 
 
-def predictor_of(surrogate: Surrogate) -> Predictor:
+def predictor_of(surrogate: "Surrogate") -> Predictor:
     """A surrogate's answer to a sample: with its bands, where it is calibrated."""
 
     def answer(sample: Sample, cast: CastMould) -> Guess:
         if surrogate.calibration is not None:
             return surrogate.examine(cast, sample.parameters)
-        return surrogate.predict_mould(cast, sample.parameters)
+        (fields,) = surrogate.predict(cast, [sample.parameters])
+        return np.asarray(fields)
 
     return answer
 
@@ -113,7 +117,7 @@ def evaluate(
             measured = sample_measures(fields, cast)
             row |= {f"{name}_{source}": value for name, value in measured.items()}
         if isinstance(guess, Prediction):
-            row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.shape, strict=True)}
+            row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.ratios, strict=True)}
             row |= _coverage(guess, sample, row)
         rows.append(row)
         on_progress(sample.simulation)
@@ -125,7 +129,7 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
     inside = sample.depression.astype(bool)
     held = guess.field_bands.hold(without_sign(guess.fields) - without_sign(sample.fields))
     true = np.array([row[f"{name}_simulated"] for name in SHAPES])
-    shapes = guess.shape_bands.hold(guess.shape - true)
+    shapes = guess.ratio_bands.hold(guess.ratios - true)
     found: dict[str, Any] = {}
     for number, level in enumerate(LEVELS):
         name = f"cover{round(100 * level)}"
@@ -133,9 +137,13 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
         for column, shape in enumerate(SHAPES):
             known = np.isfinite(true[column])
             found[f"{name}_{shape}"] = float(shapes[number, column]) if known else float("nan")
-    widest = guess.shape_bands.half[-1]
+    widest = guess.ratio_bands.half[-1]
     found |= {f"{name}_band95": float(widest[column]) for column, name in enumerate(SHAPES)}
-    return found | {"disagreement": guess.disagreement, "distance": guess.distance, "unlike": guess.unlike}
+    return found | {
+        "disagreement": guess.disagreement,
+        "distance": guess.distance,
+        "unlike": guess.out_of_distribution,
+    }
 
 
 def noise_floor(stack: Path, further: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,9 @@ from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.surrogate.bands import LEVELS
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 POINT = ["delta", "kappa_nnn", "ratio"]
 SHAPES = ("area_ratio", "width_ratio")
@@ -72,7 +74,10 @@ def measure(
 
 
 def predict(
-    surrogate: Surrogate, mould: Mould, grid: Grid, on_progress: Callable[[Point], None] = lambda point: None
+    surrogate: "Surrogate",
+    mould: Mould,
+    grid: Grid,
+    on_progress: Callable[[Point], None] = lambda point: None,
 ) -> pd.DataFrame:
     """A/A0 and w/w0 at every point of a grid as the surrogate predicts them, with its 95 % bands.
 
@@ -86,12 +91,12 @@ def predict(
     cast = surrogate.cast(mould)
     for parameters in grid.points.values():
         point = point_of(parameters)
-        seen = surrogate.examine(cast, parameters)
+        predicted = surrogate.examine(cast, parameters)
         row: dict[str, Any] = dict(zip(POINT, point, strict=True))
-        row |= dict(zip(SHAPES, seen.shape.tolist(), strict=True))
-        bands = seen.shape_bands.half[widest].tolist()
+        row |= dict(zip(SHAPES, predicted.ratios.tolist(), strict=True))
+        bands = predicted.ratio_bands.half[widest].tolist()
         row |= {f"{name}_band95": band for name, band in zip(SHAPES, bands, strict=True)}
-        rows.append(row | {"unlike": seen.unlike})
+        rows.append(row | {"unlike": predicted.out_of_distribution})
         on_progress(point)
     return pd.DataFrame(rows)
 
@@ -174,7 +179,7 @@ def tissues(
     shards: Iterable[Path],
     runs: Sequence[Run],
     mould: Mould,
-    surrogate: Surrogate,
+    surrogate: "Surrogate",
     configuration: str | None = None,
 ) -> list[Tissue]:
     """Tissues at some points of a sweep, in the order of `points`; without those whose simulation failed.
@@ -193,7 +198,7 @@ def tissues(
     for record in _records(shards, configuration):
         if record.simulation in wanted:
             simulated = record_fields(record, surrogate.pixels)
-            predicted = surrogate.predict_mould(cast, record.parameters)
+            predicted = surrogate.predict(cast, [record.parameters])[0]
             point = wanted[record.simulation]
             found[point] = Tissue(point, simulated, predicted)
     if not found:

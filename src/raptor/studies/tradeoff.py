@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,9 @@ from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
-from raptor.surrogate.inference import Surrogate
+
+if TYPE_CHECKING:  # tables and figures do not wait for torch
+    from raptor.surrogate.inference import Surrogate
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ class Comparison:
 def compare(
     case: Case,
     comparison: Comparison,
-    surrogate: Surrogate | None = None,
+    surrogate: "Surrogate | None" = None,
     on_progress: Callable[[str], None] = lambda what: None,
 ) -> pd.DataFrame:
     """One row a method: cost, energy, and the errors of fields and shapes against reference runs.
@@ -165,9 +167,9 @@ def compare(
     rows += _other_models(case, reference, comparison, on_progress)
     rows += _other_rasters(case, reference, comparison.pixels, on_progress)
     if surrogate is not None:
-        predicted, seconds = _timed(partial(surrogate.predict_mould, case.mould, case.parameters))
-        shape = surrogate.shape(predicted[0], surrogate.cast(case.mould))
-        row = _row(case, reference, "surrogate", predicted, seconds)
+        predicted, seconds = _timed(partial(surrogate.predict, case.mould, [case.parameters]))
+        shape = surrogate.ratios(predicted[0, 0], surrogate.cast(case.mould))
+        row = _row(case, reference, "surrogate", predicted[0], seconds)
         row["area_error"], row["width_error"] = reference.shape_error(shape)
         rows.append(row)
     spread = {"density_spread": reference.spread[0], "area_spread": shapes[:, 0].std(ddof=1)}

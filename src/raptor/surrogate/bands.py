@@ -1,20 +1,21 @@
 """Bands about predictions, calibrated on the validation split.
 
-A band's half width is a factor times sigma, sigma^2 = spread^2 + (floor size)^2: `spread` is how far
-networks and images of D4 disagree, `size` the predicted density where fields are concerned, as the noise of
-single simulations is found where tissue is. The factor of each level is the quantile of |error| / sigma over
-the validation split (split conformal prediction; Lei et al. 2018, doi:10.1080/01621459.2017.1307116), so a
-band holds its share of all simulations that are drawn as those were, whatever the errors' distribution.
+A band's half width is a factor times sigma, sigma^2 = deviation^2 + (irreducible size)^2: `deviation` is
+how far networks and images of D4 disagree, `size` the predicted density where fields are concerned, as the
+noise of single simulations is found where tissue is. The factor of each level is the quantile of
+|error| / sigma over the validation split (split conformal prediction; Lei et al. 2018,
+doi:10.1080/01621459.2017.1307116), so a band holds its share of all simulations that are drawn as those
+were, whatever the errors' distribution.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.surrogate.out_of_distribution import Novelty
+from raptor.surrogate.out_of_distribution import TrainingSet
 
 LEVELS = (0.5, 0.8, 0.95)
 USUAL = 0.99  # part of the validation samples that the flag lets pass
@@ -33,24 +34,24 @@ class Bands:
 
 
 @dataclass(frozen=True)
-class Scale:
-    """From spread to bands, of several quantities (n,).
+class ErrorScale:
+    """From the deviation of networks to bands, of several quantities (n,).
 
     Parameters
     ----------
-    floor : tuple of float
+    irreducible : tuple of float
         Part of sigma that no agreement of networks takes away, over `size`.
     factors : tuple (levels, n)
         Half width of each level's band over sigma.
     """
 
-    floor: tuple[float, ...]
+    irreducible: tuple[float, ...]
     factors: tuple[tuple[float, ...], ...]
 
-    def bands(self, spread: NDArray[np.floating], size: NDArray[np.floating]) -> Bands:
-        """Bands of quantities with a spread (n, ...) and size (n or 1, ...)."""
-        sigma = _sigma(np.array(self.floor), spread, size)
-        factors = np.array(self.factors).reshape(len(LEVELS), -1, *(1,) * (spread.ndim - 1))
+    def bands(self, deviation: NDArray[np.floating], size: NDArray[np.floating]) -> Bands:
+        """Bands of quantities with a deviation (n, ...) and size (n or 1, ...)."""
+        sigma = _sigma(np.array(self.irreducible), deviation, size)
+        factors = np.array(self.factors).reshape(len(LEVELS), -1, *(1,) * (deviation.ndim - 1))
         return Bands((factors * sigma).astype(np.float32))
 
 
@@ -60,65 +61,71 @@ class Calibration:
 
     Parameters
     ----------
-    fields, shapes : Scale
+    fields, ratios : ErrorScale
         Of the eight fields, and of A/A0 and w/w0.
-    disagreement : float
-        Of networks about density (`relative_spread`), that all but a hundredth of samples stay below.
-    novelty : Novelty
-        Distance to the training set.
-    edge : float
-        Where a tissue ends in predicted densities, over where it ends in simulated ones: predicted edges are
-        softer, so that the same threshold lies farther out.
+    usual_disagreement : float
+        Of networks (`disagreement`), that all but a hundredth of the validation samples stay below.
+    training : TrainingSet
+        To which the distance of inputs is measured.
+    threshold_factor : float
+        Of the density above which there is tissue: predicted rims are softer, so that the simulations'
+        threshold lies farther out in them.
     """
 
-    fields: Scale
-    shapes: Scale
-    disagreement: float
-    novelty: Novelty
-    edge: float = 1.0
+    fields: ErrorScale
+    ratios: ErrorScale
+    usual_disagreement: float
+    training: TrainingSet
+    threshold_factor: float = 1.0
 
-    def disagreement_of(self, spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
-        """Disagreement of networks about density over what is usual."""
-        return relative_spread(spread, fields) / self.disagreement
+    def relative_disagreement(self, deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
+        """`disagreement` over what is usual."""
+        return disagreement(deviation, fields) / self.usual_disagreement
 
     def as_json(self) -> dict[str, Any]:
         """As it stands in model.json; the points of the training set stand beside the weights."""
         return {
             "levels": LEVELS,
-            "fields": {"floor": self.fields.floor, "factors": self.fields.factors},
-            "shapes": {"floor": self.shapes.floor, "factors": self.shapes.factors},
-            "disagreement": self.disagreement,
-            "distance": self.novelty.usual,
-            "edge": self.edge,
+            "fields": asdict(self.fields),
+            "ratios": asdict(self.ratios),
+            "usual_disagreement": self.usual_disagreement,
+            "usual_distance": self.training.usual,
+            "threshold_factor": self.threshold_factor,
         }
 
     @classmethod
     def from_json(cls, content: dict[str, Any], points: NDArray[np.float32]) -> "Calibration":
         """Read back what `as_json` gave."""
-        fields, shapes = (
-            Scale(tuple(part["floor"]), tuple(tuple(row) for row in part["factors"]))
-            for part in (content["fields"], content["shapes"])
+        fields, ratios = (
+            ErrorScale(tuple(part["irreducible"]), tuple(tuple(row) for row in part["factors"]))
+            for part in (content["fields"], content["ratios"])
         )
-        novelty = Novelty(points, content["distance"])
-        return cls(fields, shapes, content["disagreement"], novelty, content.get("edge", 1.0))
+        training = TrainingSet(points, content["usual_distance"])
+        return cls(fields, ratios, content["usual_disagreement"], training, content["threshold_factor"])
 
 
-def relative_spread(spread: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
-    """Root mean square spread of density (8, y, x) over the deviation of density, in the image."""
-    return float(np.sqrt((spread[0] ** 2).mean(dtype=np.float64)) / (fields[0].std(dtype=np.float64) + TINY))
+def disagreement(deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
+    """Root mean square deviation of networks about density, over that of density in the image.
+
+    Both (8, y, x).
+    """
+    rms = np.sqrt((deviation[0] ** 2).mean(dtype=np.float64))
+    return float(rms / (fields[0].std(dtype=np.float64) + TINY))
 
 
-def fit_scale(error: NDArray[np.floating], spread: NDArray[np.floating], size: NDArray[np.floating]) -> Scale:
-    """The scale whose bands hold their share of errors (samples, n), of spreads and sizes alike.
+def fit_scale(
+    error: NDArray[np.floating], deviation: NDArray[np.floating], size: NDArray[np.floating]
+) -> ErrorScale:
+    """The scale whose bands hold their share of errors (samples, n), of deviations and sizes alike.
 
-    The floor is half the root mean square error over that of size: enough for a band where networks
+    `irreducible` is half the root mean square error over that of size: enough for a band where networks
     happen to agree, not so much that disagreement counts for nothing. NaN are left out.
     """
     squares = [np.nanmean(part.astype(np.float64) ** 2, axis=0) for part in (error, size)]
-    floor = 0.5 * np.sqrt(squares[0] / (squares[1] + TINY))
-    ratio = np.abs(error) / _sigma(floor, np.moveaxis(spread, -1, 0), np.moveaxis(size, -1, 0)).T
+    irreducible = 0.5 * np.sqrt(squares[0] / (squares[1] + TINY))
+    ratio = np.abs(error) / _sigma(irreducible, np.moveaxis(deviation, -1, 0), np.moveaxis(size, -1, 0)).T
     factors = [[_conformal(column, level) for column in ratio.T] for level in LEVELS]
-    return Scale(tuple(float(v) for v in floor), tuple(tuple(row) for row in factors))
+    return ErrorScale(tuple(float(v) for v in irreducible), tuple(tuple(row) for row in factors))
 
 
 def _conformal(ratio: NDArray[np.floating], level: float) -> float:
@@ -129,8 +136,8 @@ def _conformal(ratio: NDArray[np.floating], level: float) -> float:
 
 
 def _sigma(
-    floor: NDArray[np.float64], spread: NDArray[np.floating], size: NDArray[np.floating]
+    irreducible: NDArray[np.float64], deviation: NDArray[np.floating], size: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """sqrt(spread^2 + (floor size)^2) of quantities (n, ...)."""
-    wide = floor.reshape(-1, *(1,) * (spread.ndim - 1))
-    return np.asarray(np.sqrt(spread.astype(np.float64) ** 2 + (wide * size) ** 2 + TINY**2))
+    """sqrt(deviation^2 + (irreducible size)^2) of quantities (n, ...)."""
+    own = irreducible.reshape(-1, *(1,) * (deviation.ndim - 1)) * size
+    return np.asarray(np.sqrt(deviation.astype(np.float64) ** 2 + own**2 + TINY**2))

@@ -1,4 +1,4 @@
-"""Learning on the validation split how errors follow from the spread of networks."""
+"""Calibration on the validation split: how errors follow from the disagreement of networks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,44 @@ from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.raster import density_threshold
-from raptor.surrogate.bands import USUAL, Calibration, fit_scale, relative_spread
-from raptor.surrogate.inference import Surrogate, deviation
-from raptor.surrogate.out_of_distribution import Novelty, descriptors
+from raptor.surrogate.bands import USUAL, Calibration, disagreement, fit_scale
+from raptor.surrogate.inference import Ensemble, Surrogate, deviation
+from raptor.surrogate.out_of_distribution import TrainingSet, descriptors
 
-EDGES = (0.8, 1.25)  # between which the edge of predicted tissues is sought
-PIXELS = 400  # of each sample, chosen at random within the depression
+FACTORS = (0.8, 1.25)
+"""Bounds of the factor of the threshold of predicted tissues."""
+
+PIXELS = 400
+"""Of each sample, chosen at random within the depression."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A validation sample and what was predicted of it.
+
+    Parameters
+    ----------
+    cast : CastMould
+    ratios : ndarray (2,)
+        A/A0 and w/w0, as simulated.
+    density : ndarray (y, x)
+        Predicted by all networks.
+    densities : ndarray (n, y, x)
+        Predicted by each network.
+    """
+
+    cast: CastMould
+    ratios: NDArray[np.float64]
+    density: NDArray[np.float32]
+    densities: NDArray[np.float32]
+
+    def error(self, threshold: float) -> NDArray[np.float64]:
+        """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
+        return shape_ratios(self.density, self.cast, threshold) - self.ratios
+
+    def deviation(self, threshold: float) -> NDArray[np.float64]:
+        """Standard deviation (2,) of both ratios over networks."""
+        return deviation(np.array([shape_ratios(each, self.cast, threshold) for each in self.densities]))
 
 
 def calibrate(
@@ -37,72 +69,56 @@ def calibrate(
     RaptorError
         Where the stack has no validation sample.
     """
-    table, threshold = read_table(stack), density_threshold(surrogate.layers, surrogate.pixels)
+    table = read_table(stack)
     rows = table.rows("validation")
     if not rows:
         raise RaptorError(f"{stack} has no validation sample; raise design.validation")
     points = np.stack([_descriptors(sample) for sample in read_samples(stack, table.rows("train"))])
-    novelty = Novelty(points.astype(np.float32))
-    fields: list[NDArray[np.floating]] = []
-    seen: list[Silhouette] = []
+    training = TrainingSet(points.astype(np.float32))
+    pixels: list[NDArray[np.floating]] = []
+    cases: list[Case] = []
     disagreements, distances = [], []
     for sample in read_samples(stack, rows):
         cast = surrogate.cast(moulds[sample.mould])
-        predicted, spread, of_members = surrogate.ensemble(cast, sample.parameters)
-        rng = np.random.default_rng([seed, sample.simulation])
-        inside = np.flatnonzero(cast.depression)
-        chosen = rng.choice(inside, PIXELS, replace=len(inside) < PIXELS)
-        error, wide, size = (
-            part.reshape(len(part), -1)[:, chosen].T
-            for part in (without_sign(predicted) - without_sign(sample.fields), spread, np.abs(predicted[:1]))
-        )
-        fields.append(np.stack([error, wide, np.broadcast_to(size, error.shape)]))
-        true = shape_ratios(sample.fields[0], cast)
-        seen.append(Silhouette(cast, true, predicted[0], of_members))
-        disagreements.append(relative_spread(spread, predicted))
-        distances.append(novelty.distance(_descriptors(sample)))
+        found = surrogate.ensemble(cast, sample.parameters)
+        pixels.append(_draw_pixels(found, sample, np.random.default_rng([seed, sample.simulation])))
+        cases.append(Case(cast, shape_ratios(sample.fields[0], cast), found.mean[0], found.densities))
+        disagreements.append(disagreement(found.deviation, found.mean))
+        distances.append(training.distance(_descriptors(sample)))
         on_progress(sample.simulation)
-    edge = fit_edge(seen, threshold)
-    shapes = [each.errors(edge * threshold) for each in seen]
+    simulated = density_threshold(surrogate.layers, surrogate.pixels)
+    factor = fit_threshold(cases, simulated)
+    errors = np.array([case.error(factor * simulated) for case in cases])
+    deviations = np.array([case.deviation(factor * simulated) for case in cases])
     return Calibration(
-        fit_scale(*np.concatenate(fields, axis=1)),
-        fit_scale(*np.stack(shapes, axis=1)),
+        fit_scale(*np.concatenate(pixels, axis=1)),
+        fit_scale(errors, deviations, np.ones_like(errors)),
         float(np.quantile(disagreements, USUAL)),
-        Novelty(novelty.points, float(np.quantile(distances, USUAL))),
-        edge,
+        TrainingSet(training.points, float(np.quantile(distances, USUAL))),
+        factor,
     )
 
 
-@dataclass(frozen=True)
-class Silhouette:
-    """A tissue's true ratios (2,), and densities predicted by all networks (y, x) and by each (n, y, x)."""
-
-    cast: CastMould
-    true: NDArray[np.float64]
-    predicted: NDArray[np.float32]
-    of_members: NDArray[np.float32]
-
-    def error(self, threshold: float) -> NDArray[np.float64]:
-        """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
-        return shape_ratios(self.predicted, self.cast, threshold) - self.true
-
-    def errors(self, threshold: float) -> NDArray[np.float64]:
-        """Errors, spread over networks and sizes of both ratios, (3, 2)."""
-        of_each = [shape_ratios(d, self.cast, threshold) for d in self.of_members]
-        return np.stack([self.error(threshold), deviation(np.array(of_each)), np.ones(2)])
+def _draw_pixels(found: Ensemble, sample: Sample, rng: np.random.Generator) -> NDArray[np.floating]:
+    """Errors, deviations and sizes (3, PIXELS, 8) of pixels drawn within the depression."""
+    inside = np.flatnonzero(sample.depression)
+    chosen = rng.choice(inside, PIXELS, replace=len(inside) < PIXELS)
+    error = without_sign(found.mean) - without_sign(sample.fields)
+    size = np.broadcast_to(np.abs(found.mean[:1]), error.shape)
+    return np.stack([part.reshape(len(part), -1)[:, chosen].T for part in (error, found.deviation, size)])
 
 
-def fit_edge(seen: Sequence[Silhouette], threshold: float) -> float:
+def fit_threshold(cases: Sequence[Case], threshold: float) -> float:
     """The factor of the threshold at which A/A0 and w/w0 err least, by their mean absolute error.
 
     Networks soften what they are not sure of: the contour of the simulated tissue's density lies outside
     of the tissue in a softer image, and a higher one where the tissue ends.
     """
 
-    def cost(edge: float) -> float:
-        return float(np.nanmean([np.abs(each.error(edge * threshold)) for each in seen]))
+    def cost(factor: float) -> float:
+        return float(np.nanmean([np.abs(case.error(factor * threshold)) for case in cases]))
 
-    return float(minimize_scalar(cost, bounds=EDGES, method="bounded", options={"xatol": 1e-3}).x)
+    return float(minimize_scalar(cost, bounds=FACTORS, method="bounded", options={"xatol": 1e-3}).x)
 
 
 def _descriptors(sample: Sample) -> NDArray[np.float64]:

@@ -12,7 +12,6 @@ from torch import Tensor, nn
 from torch.nn.functional import conv2d, softplus
 
 from raptor.dataset.scaling import Scaling
-from raptor.fields.metrics import without_sign
 from raptor.frame import pixel_size
 from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
@@ -71,8 +70,9 @@ class PhysicalFields(nn.Module):
 def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     """Fields (n, 8, y, x) in physical units made to obey the physics, for networks that do not by themselves.
 
-    Negative density and density out of reach are dropped and the rest scaled to the cells; negative
-    eigenvalues of the tensor are dropped and its trace scaled to the density.
+    Masks are (n or 1, 1, y, x), numbers of cells (n or 1,). Negative density and density out of reach are
+    dropped and the rest scaled to the cells; negative eigenvalues of the tensor are dropped and its trace
+    scaled to the density.
     """
     there = reachable(depression)
     density = fields[:, :1].clamp(min=0.0) * there
@@ -110,14 +110,6 @@ def _positive(tensor: Tensor, trace: Tensor) -> Tensor:
     values = values * (trace / values.sum(1))[:, None]
     mended: Tensor = (vectors * values[:, None, :]) @ vectors.transpose(1, 2)
     return mended.to(tensor.dtype)
-
-
-def average(fields: Tensor) -> Tensor:
-    """Mean (8, y, x) of predictions (n, 8, y, x) of one tissue, sxsz and sysz by magnitude.
-
-    Their signs mean nothing, and magnitudes are what D4 moves like any image; `signed` gives signs back.
-    """
-    return without_sign(fields).mean(0)
 
 
 def signed(fields: Tensor) -> Tensor:

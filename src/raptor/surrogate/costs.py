@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
@@ -18,7 +19,6 @@ MOULD = Mould(
     "mirrors",
 )
 PARAMETERS = CellParameters(0.5, 0.4, 0.2)
-CELLS = 9500
 REPEATS = 5
 
 
@@ -30,9 +30,7 @@ def costs_of(
     One image by one member, all eight images by one member, and those by all members: to the eight fields
     in physical units, on as many threads as torch has; medians of a few.
     """
-    one = Surrogate(
-        surrogate.members[:1], surrogate.architecture, surrogate.scaling, surrogate.layers, surrogate.pixels
-    )
+    one = replace(surrogate, members=surrogate.members[:1])
     training = description["training"]
     return {
         "network": surrogate.architecture.network,
@@ -53,6 +51,6 @@ def _milliseconds(surrogate: Surrogate, *, averaged: bool) -> float:
     times = []
     for _ in range(REPEATS + 1):  # the first also plans
         started = time.perf_counter()
-        surrogate.predict(cast.depression, cast.tethers, [PARAMETERS], CELLS, averaged=averaged)
+        surrogate.predict(cast, [PARAMETERS], averaged=averaged)
         times.append(1000 * (time.perf_counter() - started))
     return median(times[1:])

@@ -18,11 +18,10 @@ from raptor.core.version import MODEL_VERSION
 from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling
 from raptor.frame import pixel_centres
-from raptor.moulds.geometry import Mould
-from raptor.parameters import CellParameters
 from raptor.surrogate.bands import LEVELS, Calibration
 from raptor.surrogate.generator import Generator
-from raptor.surrogate.inference import Prediction, Surrogate
+from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.prediction import Prediction
 from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS
 
@@ -53,7 +52,7 @@ def save(
     }
     calibration = surrogate.calibration
     if calibration is not None:
-        tensors[DESCRIPTORS] = torch.from_numpy(calibration.novelty.points)
+        tensors[DESCRIPTORS] = torch.from_numpy(calibration.training.points)
     with atomic_path(folder / WEIGHTS) as temporary:
         contiguous = {name: value.contiguous() for name, value in tensors.items()}
         save_file(contiguous, temporary, metadata={"identity": identity})
@@ -113,7 +112,6 @@ def load(folder: Path) -> Surrogate:
         points = tensors.pop(DESCRIPTORS, None)
         for number, member in enumerate(members):
             member.load_state_dict(_of_member(tensors, number))
-            member.eval()
         calibration = None
         if content["calibration"] is not None:
             if points is None:
@@ -136,11 +134,11 @@ def _of_member(tensors: Mapping[str, Tensor], number: int) -> dict[str, Tensor]:
     return {name: v.float() if v.dtype == torch.float16 else v for name, v in part.items()}
 
 
-def write_prediction(path: Path, prediction: Prediction, mould: Mould, parameters: CellParameters) -> None:
+def write_prediction(path: Path, prediction: Prediction) -> None:
     """Write a prediction, in physical units, with standard deviations of its error."""
     pixels = prediction.fields.shape[-1]
     with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
-        file.mould = mould.name
+        file.mould = prediction.cast.mould.name
         file.threshold = prediction.threshold  # density per pixel above which there is tissue in these fields
         sizes = {"sample": 1, "level": len(LEVELS), "field": len(FIELDS), "y": pixels, "x": pixels}
         for name, size in sizes.items():
@@ -156,11 +154,11 @@ def write_prediction(path: Path, prediction: Prediction, mould: Mould, parameter
             f"deviation of the error, per pixel: {WIDEST} of it hold {100 * LEVELS[-1]:.0f} % of simulations"
         )
         variable(file, "fields_std", ("sample", *image), deviation, text)
-        for name, value in asdict(parameters).items():
+        for name, value in asdict(prediction.parameters).items():
             variable(file, name, ("sample",), [value], name)
         for column, (name, text) in enumerate((("area_ratio", "A/A0"), ("width_ratio", "w/w0"))):
-            variable(file, name, ("sample",), [prediction.shape[column]], text)
-            half = prediction.shape_bands.half[None, :, column]
+            variable(file, name, ("sample",), [prediction.ratios[column]], text)
+            half = prediction.ratio_bands.half[None, :, column]
             variable(file, f"{name}_band", ("sample", "level"), half, f"half width of the band of {text}")
         for name, text in (
             ("disagreement", "disagreement of the networks over what is usual; above 1 trust nothing"),

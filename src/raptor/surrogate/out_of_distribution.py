@@ -1,4 +1,4 @@
-"""How unlike the training set a mould and its parameters are."""
+"""How far a mould and its parameters are from the training set."""
 
 import math
 from dataclasses import dataclass
@@ -22,31 +22,26 @@ def descriptors(
 ) -> NDArray[np.float64]:
     """Numbers (`DESCRIPTORS`,) that say what a mould (masks (y, x)) and its parameters are like.
 
-    None of them changes when the mould is turned or mirrored. Parameters over the width of their range,
+    They do not change when the mould is turned or mirrored. Parameters over the width of their range,
     lengths in l0, areas as lengths of a square; slenderness is the logarithm of the ratio of the
     depression's principal axes.
     """
     size = pixel_size(depression.shape[-1])
-    y, x = np.nonzero(depression)
-    axes = np.sqrt(np.linalg.eigvalsh(np.cov(np.stack([x, y]) * size))) if len(x) > 2 else np.ones(2)
+    short, long = _principal_axes(depression, size)
     marks, count = label(np.asarray(tethers) > 0, np.ones((3, 3)))
     extents = [
-        size * math.hypot(*(piece.stop - piece.start for piece in found)) for found in find_objects(marks)
+        size * math.hypot(*(part.stop - part.start for part in found)) for found in find_objects(marks)
     ]
-    values = [
-        (value - bounds.lower) / (bounds.upper - bounds.lower)
-        for value, bounds in (
-            (parameters.delta, DELTA),
-            (parameters.kappa_nnn, KAPPA_NNN),
-            (parameters.kappa_nnnn, KAPPA_NNNN),
-        )
-    ]
+    values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
     return np.array(
         [
-            *values,
-            size * math.sqrt(len(x)),
-            4 * float(axes[1]),
-            math.log(max(float(axes[1]), 1e-3) / max(float(axes[0]), 1e-3)),
+            *(
+                (value - bounds.lower) / (bounds.upper - bounds.lower)
+                for value, bounds in zip(values, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True)
+            ),
+            size * math.sqrt(np.count_nonzero(depression)),
+            4 * long,
+            math.log(long / short),
             math.sqrt(count),
             size * math.sqrt(np.count_nonzero(tethers)),
             max(extents, default=0.0),
@@ -54,9 +49,18 @@ def descriptors(
     )
 
 
+def _principal_axes(mask: NDArray[np.generic], size: float) -> tuple[float, float]:
+    """Standard deviations, l0, of a mask (y, x) with pixels of a size along its principal axes, ascending."""
+    points = size * np.stack(np.nonzero(mask))
+    if points.shape[1] < 3:
+        return 1.0, 1.0
+    short, long = np.sqrt(np.linalg.eigvalsh(np.cov(points)))
+    return max(float(short), 1e-3), max(float(long), 1e-3)
+
+
 @dataclass(frozen=True)
-class Novelty:
-    """Distance to the nearest of a training set's descriptors.
+class TrainingSet:
+    """The descriptors of a training set, to which others' distance is measured.
 
     Parameters
     ----------
@@ -69,8 +73,8 @@ class Novelty:
     points: NDArray[np.float32]
     usual: float = 1.0
 
-    def distance(self, seen: NDArray[np.float64]) -> float:
-        """Euclidean distance over standard deviations to the nearest training sample, in what is usual."""
+    def distance(self, point: NDArray[np.float64]) -> float:
+        """Euclidean distance to the nearest point, each descriptor over its deviation, over what is usual."""
         deviation = self.points.std(axis=0) + 1e-6
-        nearest, _ = KDTree(self.points / deviation).query(seen / deviation)
+        nearest, _ = KDTree(self.points / deviation).query(point / deviation)
         return float(nearest) / self.usual

@@ -2,22 +2,38 @@
 from .condor.simulate import Tissue, simulate
 from .core.errors import RaptorError
 from .core.version import MODEL_VERSION, __version__
+from .dataset.result import load_fields, save
+from .fitting.command import fit
+from .fitting.fitted import FittedTissue
 from .moulds.geometry import Circle, Mould
 from .moulds.library.tissues import MeasuredTissue, tissue
 from .moulds.reading import read_mould
 from .parameters import CellParameters, NetworkModel
+from .plotting.front import plot
+from .surrogate.command import load_surrogate, predict
+from .surrogate.inference import Surrogate
+from .surrogate.prediction import Prediction
 
 __all__ = [
     "MODEL_VERSION",
     "CellParameters",
     "Circle",
+    "FittedTissue",
     "MeasuredTissue",
     "Mould",
     "NetworkModel",
+    "Prediction",
     "RaptorError",
+    "Surrogate",
     "Tissue",
     "__version__",
+    "fit",
+    "load_fields",
+    "load_surrogate",
+    "plot",
+    "predict",
     "read_mould",
+    "save",
     "simulate",
     "tissue",
 ]

@@ -115,8 +115,3 @@ def _image(positions: NDArray[np.float64], values: NDArray[np.float64], pixels: 
 def density_threshold(layers: int, pixels: int) -> float:
     """Density per pixel above which there is tissue: 0.2 at 7 layers and 256 pixels (paper)."""
     return 0.48 * layers * pixel_size(pixels) ** 2
-
-
-def normalised(fields: NDArray[np.floating], cells: int) -> NDArray[np.floating]:
-    """Zbar_p = (N_p / N_c) Z_p, whose mean over pixels is the mean over cells (paper, eq. 5)."""
-    return np.asarray(fields * (fields.shape[-1] * fields.shape[-2] / cells))

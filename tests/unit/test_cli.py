@@ -1,8 +1,11 @@
-"""The command line as a user meets it: in a process of its own."""
+"""The command line as a user meets it; but for two runs in this process, which need not start again."""
 
 import json
+import re
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +14,11 @@ import shapely
 import xarray as xr
 from PIL import Image
 
-from raptor.cli import COMMANDS
+from raptor.cli import COMMANDS, main
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.dataset.check import check
+from raptor.fields.labelled import mould_of
 from raptor.moulds import Mould, read_mould, write_moulds
 from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
@@ -25,22 +29,29 @@ DOG_BONE = ROOT / "tests" / "data" / "moulds"
 
 
 def raptor(*arguments):
-    command = [str(Path(sys.executable).parent / "raptor"), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    """What a command returns and prints."""
+    command, out, err = list(map(str, arguments)), StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main(command)
+    return subprocess.CompletedProcess(command, end.value.code or 0, out.getvalue(), err.getvalue())
 
 
 def options(delta=0.5, nnn=0.5, nnnn=0.3):
     return ("--delta", delta, "--kappa-nnn", nnn, "--kappa-nnnn", nnnn)
 
 
-def test_simulate_writes_a_sound_shard(tmp_path):
+def test_simulate_as_a_program_writes_fields_and_cells(tmp_path):
     output = tmp_path / "tissue.nc"
-    done = raptor("simulate", MOULD, *options(), "--layers", 1, "--accuracy", "draft", "--output", output)
+    program = Path(sys.executable).parent / "raptor"
+    arguments = ("simulate", MOULD, *options(), "--layers", 1, "--accuracy", "draft", "--output", output)
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "converged" in done.stdout
     assert check(output) == []
-    with xr.open_dataset(output) as shard:
-        assert int(shard["row_size"][0]) == shard.sizes["cell"] > 500
+    with xr.open_dataset(output, group="cells") as cells, xr.open_dataset(output) as fields:
+        assert int(cells["row_size"][0]) == cells.sizes["cell"] > 500
+        assert float(fields.density.sum()) == pytest.approx(cells.sizes["cell"], rel=1e-4)
+        assert mould_of(fields).outline.equals(read_mould(MOULD).outline)
 
 
 def test_simulate_takes_a_tissue_and_gives_a_picture_and_numbers(tmp_path):
@@ -53,9 +64,9 @@ def test_simulate_takes_a_tissue_and_gives_a_picture_and_numbers(tmp_path):
     numbers = json.loads(done.stdout)
     assert (numbers["delta"], numbers["kappa_nnn"]) == (0.3, 0.6465)  # a flag goes before the tissue
     assert check(output) == []
-    with xr.open_dataset(output) as shard:
-        assert numbers["cells"] == shard.sizes["cell"]
-        assert numbers["converged"] is bool(shard["converged"][0])
+    with xr.open_dataset(output, group="cells") as cells:
+        assert numbers["cells"] == cells.sizes["cell"]
+        assert numbers["converged"] is bool(cells["converged"][0])
     assert 0.3 < numbers["width_ratio"] < 1
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -94,9 +105,18 @@ def test_bad_input_to_draw(arguments, message):
     assert message in done.stderr
 
 
+def test_the_library_is_listed():
+    lines = raptor("moulds").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(MOULDS)
+    assert "glial_1              53 x 26.5 l0  4 tethers  Rectangle" in "\n".join(lines)
+    lines = raptor("tissues").stdout.splitlines()
+    assert "glial_1     mould glial_1     A/A0 0.814, w/w0 0.797  Glial cells in collagen" in lines[0]
+    assert "not measured" in lines[-1]
+
+
 def test_every_command_teaches_by_an_example():
     for command in COMMANDS:
-        assert f"\n    Example:\n      raptor {command.__name__} " in command.__doc__
+        assert re.search(rf"\n    Example:\n      raptor {command.__name__}\b", command.__doc__)
     done = raptor("simulate", "--help")
     assert "raptor simulate mould.svg --tissue glial_1 \\" in done.stdout
 
@@ -273,8 +293,8 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
         ((), "give what was measured in one way"),
         (("--tissue", "glial_1", "--area-ratio", 0.5), "give what was measured in one way"),
         (("--tissue", "tenocyte"), "has no measured ratio to fit"),
-        (("--area-ratio", 2), "a ratio to the mould's lies between 0 and 1.5"),
-        (("--area-ratio", 0.5, *options()), "give --by simulator too"),
+        (("--area-ratio", 2), "a ratio to the tissue as cast lies between 0 and 1.5"),
+        (("--area-ratio", 0.5, *options()), "or --by simulator"),
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
         (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
         (("--outline", MOULD), "is no picture, or is cut short"),
@@ -301,11 +321,10 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
     assert "A/A0" in done.stdout
     assert "unlike the training set" in done.stdout
     with xr.open_dataset(output) as prediction:
-        assert prediction["fields"].dims == ("sample", "field", "y", "x")
-        assert prediction["fields_std"].dims == prediction["fields"].dims
-        assert (prediction["fields_std"] > 0).all()
-        assert float(prediction["delta"][0]) == 0.5
-        assert float(prediction["area_ratio_band"][0, 2]) >= 0.3
+        assert prediction["density"].dims == ("y", "x")
+        assert (prediction["density_std"] > 0).all()
+        assert float(prediction["delta"]) == 0.5
+        assert float(prediction["area_ratio_band"].sel(level=0.95)) >= 0.3
     assert raptor("check", output).returncode == 0
 
 

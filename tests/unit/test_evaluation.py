@@ -28,7 +28,7 @@ from raptor.surrogate.baselines import Nearest, baseline, training_mean
 from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.calibration import Case, calibrate, fit_threshold
 from raptor.surrogate.costs import costs_of
-from raptor.surrogate.files import load, save, write_prediction
+from raptor.surrogate.files import load, save
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.out_of_distribution import DESCRIPTORS, TrainingSet, descriptors
@@ -124,21 +124,20 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
     (sample,) = read_samples(stack, read_table(stack).rows("test")[:1])
     mould = moulds[sample.mould]
     prediction = surrogate.examine(mould, sample.parameters)
-    assert prediction.fields.shape == (8, 32, 32)
+    assert prediction.values.shape == (8, 32, 32)
     assert prediction.field_bands.half.shape == (3, 8, 32, 32)
     assert prediction.ratio_bands.half.shape == (3, 2)
-    assert np.allclose(prediction.fields, surrogate.predict(mould, [sample.parameters])[0], atol=1e-5)
+    assert np.allclose(prediction.values, surrogate.predict(mould, [sample.parameters])[0], atol=1e-5)
     for half in (False, True):
         folder = tmp_path / f"{half}"
         save(folder, surrogate, {"training": {"threads": 1}}, "id", half=half)
         again = load(folder).examine(mould, sample.parameters)
         near = 5e-3 if half else 1e-6
-        assert np.abs(again.fields - prediction.fields).max() < near * np.abs(prediction.fields).max()
+        assert np.abs(again.values - prediction.values).max() < near * np.abs(prediction.values).max()
         assert again.ratio_bands.half == pytest.approx(prediction.ratio_bands.half, rel=0.05)
         assert again.distance == pytest.approx(prediction.distance)
         assert again.threshold == pytest.approx(prediction.threshold)
     assert prediction.threshold != pytest.approx(density_threshold(2, 32), rel=1e-3)
-    write_prediction(tmp_path / "p.nc", prediction)
     with pytest.raises(RaptorError, match="not calibrated"):
         replace(surrogate, calibration=None).examine(mould, sample.parameters)
 

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+import xarray as xr
 
 import raptor
+from raptor.dataset.check import check
 from raptor.fields.labelled import mould_of
 from raptor.symmetry import FIELDS
 
@@ -92,6 +94,105 @@ def test_bad_arguments_are_named(change, message):
     arguments = {"mould": "small_rectangle", "cells": raptor.CellParameters(0.5, 0.5, 0.3), **change}
     with pytest.raises(raptor.RaptorError, match=message):
         raptor.simulate(**arguments)
+
+
+@pytest.fixture(scope="module")
+def prediction(mould):
+    return raptor.predict(mould, raptor.CellParameters(0.5, 0.5, 0.3))
+
+
+def test_a_prediction_has_fields_ratios_and_bands(prediction, mould):
+    fields = prediction.fields
+    assert tuple(fields.data_vars) == FIELDS
+    assert prediction.mould is mould
+    assert float(fields.density.sum()) == pytest.approx(fields.attrs["n_cells"], rel=1e-3)
+    low, high = prediction.area_ratio_band
+    assert low < prediction.area_ratio < high
+    low, high = prediction.width_ratio_band
+    assert low < prediction.width_ratio < high
+    assert float(fields.area_ratio) == prediction.area_ratio == prediction.numbers["area_ratio"]
+    assert prediction.out_of_distribution is (max(prediction.distance, prediction.disagreement) > 1)
+    assert f"A/A0 {prediction.area_ratio:.3f} +- " in str(prediction)
+    whole = prediction.to_dataset()
+    assert set(whole.data_vars) == {*FIELDS, *(f"{name}_std" for name in FIELDS)}
+    half = float(whole.area_ratio_band.sel(level=0.95))
+    assert prediction.area_ratio_band[1] - prediction.area_ratio == pytest.approx(half)
+
+
+def test_the_shipped_surrogate_is_loaded_once():
+    assert raptor.load_surrogate() is raptor.load_surrogate()
+
+
+@pytest.mark.parametrize("kind", ["tissue", "prediction"])
+def test_a_result_is_saved_drawn_and_read_again(kind, request, tmp_path):
+    result, path = request.getfixturevalue(kind), tmp_path / "result.nc"
+    raptor.save(result, path)
+    fields = raptor.load_fields(path)
+    assert check(path) == []
+    assert mould_of(fields) == result.mould
+    assert fields.density.dtype == np.float32
+    assert np.allclose(fields.density, result.to_dataset().density, atol=1e-6)
+    figures = [raptor.plot(what) for what in (result, fields)]
+    images = [figure.axes[1].images[0].get_array() for figure in figures]
+    assert np.allclose(*images, atol=1e-6)
+    assert figures[0].axes[1].get_ylabel() == ("simulation" if kind == "tissue" else "prediction")
+
+
+def test_a_mould_is_drawn_and_a_notebook_shows_it():
+    figure = raptor.plot("small_rectangle")
+    assert "26 x 13 l0" in figure.axes[0].get_title(loc="left")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(raptor.RaptorError, match="there is no picture of type int"):
+        raptor.plot(3)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "does not exist"),
+        (b"text", "cut short or not netCDF"),
+        (True, "not hold the fields"),
+    ],
+)
+def test_a_file_that_is_no_result_is_named(content, message, tmp_path):
+    path = tmp_path / "result.nc"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content:
+        xr.Dataset({"a": 3}).to_netcdf(path)
+    with pytest.raises(raptor.RaptorError, match=message):
+        raptor.load_fields(path)
+
+
+def test_a_fit_finds_parameters_and_says_what_is_left_open(tissue, mould):
+    """By the simulator from parameters of one's own, which needs no surrogate and few simulations."""
+    start = raptor.CellParameters(0.45, 0.5, 0.3)
+    found = raptor.fit(
+        mould, tissue.area_ratio, tissue.width_ratio, by="simulator", start=start, layers=1, accuracy="draft",
+        simulations=8,
+    )  # fmt: skip
+    assert found.parameters.delta == pytest.approx(0.5, abs=0.08)
+    assert found.rank < 3
+    assert found.numbers["delta"] == found.parameters.delta
+    assert "other parameters fit as well" in str(found)
+    assert raptor.plot(found).axes[0].get_title() == "simulator"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "give what was measured in one way"),
+        ({"area_ratio": 0.7, "outline": "a.png"}, "give what was measured in one way"),
+        ({"area_ratio": 70}, "lies between 0 and 1.5"),
+        ({"area_ratio": 0.7, "by": "eye"}, "allowed are surrogate, simulator"),
+        ({"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)}, "ask it too"),
+        ({"area_ratio": 0.7, "layers": 3}, "layers is 3, but this surrogate is of 7"),
+        ({"area_ratio": 0.7, "surrogate": "nowhere"}, "model.json cannot be read"),
+    ],
+)
+def test_a_fit_that_cannot_be_made_is_named(arguments, message):
+    with pytest.raises(raptor.RaptorError, match=message):
+        raptor.fit("small_rectangle", **arguments)
 
 
 def test_fields_without_a_mould_are_named(tissue):

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from raptor.core.errors import RaptorError
+from raptor.fields.metrics import normalised
 from raptor.frame import IMAGE_SIZE
-from raptor.raster import SIGMA, normalised, rasterise
+from raptor.raster import SIGMA, rasterise
 from tests import naive
 
 

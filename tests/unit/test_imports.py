@@ -7,6 +7,7 @@ import sys
 def test_figures_tables_and_configurations_do_not_wait_for_torch():
     rooms = "config, dataset, fields, fitting, imaging, moulds, plotting, studies"
     modules = (
+        "plotting.front, plotting.evaluation, plotting.fits, plotting.overlay, plotting.sweep, "
         "studies.evaluation, studies.sweep, studies.tradeoff, studies.active_learning, report.model_card"
     )
     imports = "; ".join(f"import raptor.{name.strip()}" for name in f"{rooms}, {modules}".split(","))

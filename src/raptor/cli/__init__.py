@@ -2,7 +2,7 @@
 
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import typer
@@ -10,6 +10,7 @@ import typer
 from raptor.cli.data import check, progress, reference, same, trace, well
 from raptor.cli.draw import draw
 from raptor.cli.fit import fit
+from raptor.cli.library import moulds, tissues
 from raptor.cli.measure import measure
 from raptor.cli.predict import predict
 from raptor.cli.simulate import simulate
@@ -25,7 +26,7 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    draw, simulate, predict, fit, measure, check, trace, same, progress, well, reference,
+    moulds, tissues, draw, simulate, predict, fit, measure, check, trace, same, progress, well, reference,
 )  # fmt: skip
 
 
@@ -50,10 +51,10 @@ for command in COMMANDS:
     app.command(help=_help(command.__doc__ or ""))(command)
 
 
-def main() -> None:
-    """Run the command line; bad input ends in one sentence and exit status 1."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line, or arguments in its place; bad input ends in one sentence and exit status 1."""
     try:
-        app()
+        app(arguments, prog_name="raptor")
     except RaptorError as error:
         sys.stderr.write(f"error: {error}\n")
         raise SystemExit(1) from None

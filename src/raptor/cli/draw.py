@@ -6,20 +6,20 @@ from typing import Annotated, Any
 
 import typer
 
-from raptor.cli.options import Json, Layers, Mould, Scale, report, require_picture_writable, require_writable
-from raptor.core.errors import RaptorError
+import raptor
+from raptor.cli import options as opt
 
 
 def draw(
-    mould: Mould,
+    mould: opt.Mould,
     output: Annotated[Path | None, typer.Option(help="picture to write, PNG or SVG")] = None,
-    scale: Scale = None,
-    layers: Layers = 7,
+    scale: opt.Scale = None,
+    layers: opt.Layers = 7,
     like: Annotated[
         Path | None, typer.Option(help="another mould to compare with, drawn dashed beside the first")
     ] = None,
     geojson: Annotated[Path | None, typer.Option(help="GeoJSON file to convert the mould to")] = None,
-    as_json: Json = False,
+    as_json: opt.Json = False,
 ) -> None:
     """Draw a mould as the model sees it, in numbers and a picture; convert it to GeoJSON.
 
@@ -31,50 +31,27 @@ def draw(
       raptor draw mask.png --scale 0.05 --geojson mould.geojson
       raptor draw mask.png --like mould.geojson --json
     """
-    from raptor.moulds import read_mould, write_moulds
-    from raptor.moulds.cast import cast_sites
-    from raptor.moulds.summary import summarise
-    from raptor.parameters import NetworkModel
+    from raptor.moulds import write_moulds
+    from raptor.moulds.summary import area_apart, summarise
 
-    NetworkModel(layers)  # says which numbers of layers are allowed
-    require_picture_writable(output, mould, like, geojson)
+    opt.require_picture_writable(output, mould, like, geojson)
     if geojson is not None:
         if geojson.suffix not in (".geojson", ".json"):
-            raise RaptorError(f"{geojson} is no GeoJSON's name; give one that ends in .geojson")
-        require_writable(geojson, mould, like, kind="a GeoJSON file")
-    shape = read_mould(mould, scale)
-    other = None if like is None else read_mould(like)
-    cells = cast_sites(shape, layers)
-    summary = summarise(shape)
-    numbers: dict[str, Any] = asdict(summary) | {"layers": layers, "cells": len(cells)}
+            raise raptor.RaptorError(f"{geojson} is no GeoJSON's name; give one that ends in .geojson")
+        opt.require_writable(geojson, mould, like, kind="a GeoJSON file")
+    shape = raptor.read_mould(mould, scale)
+    summary = summarise(shape, raptor.NetworkModel(layers).layers)
+    numbers, rows = dict[str, Any](asdict(summary)), summary.rows
+    other = None if like is None else raptor.read_mould(like)
     if other is not None:
-        numbers["like_cells"] = len(cast_sites(other, layers))
-        difference = shape.depression.symmetric_difference(other.depression).area
-        numbers["like_difference"] = difference / other.depression.area
+        apart, cells = area_apart(shape, other), summarise(other, layers).cells
+        numbers |= {"like_cells": cells, "like_difference": apart}
+        rows["compared"] = f"{cells:,} cells, {100 * apart:.2f} % of area apart"
     if output is not None:
         from raptor.plotting import mould_figure, save_picture
 
-        lowest = cells[cells[:, 2] == cells[0, 2], :2]
-        save_picture(mould_figure(shape, lowest, _title(numbers), other), output)
+        save_picture(mould_figure(shape, rows, other), output)
     if geojson is not None:
         write_moulds(geojson, [shape])
-    written = {"picture": output, "geojson": geojson}
-    sentence = f"{mould}: " + ", ".join(f"{name} {value}" for name, value in _title(numbers).items())
-    report(sentence, numbers | written, as_json)
-
-
-def _title(numbers: dict[str, Any]) -> dict[str, str]:
-    """What is said of a mould, by name, for people."""
-    said = {
-        "mould": numbers["mould"],
-        "size": f"{numbers['width']:.4g} x {numbers['height']:.4g} l0",
-        "area": f"{numbers['area']:.5g} l0^2",
-        "tethers": f"{numbers['tethers']}",
-        "symmetry": numbers["symmetry"].replace("_", " "),
-        "cells": f"{numbers['cells']:,} in {numbers['layers']} layers",
-    }
-    if "like_cells" in numbers:
-        said["compared"] = (
-            f"{numbers['like_cells']:,} cells, {100 * numbers['like_difference']:.2f} % of area apart"
-        )
-    return said
+    sentence = f"{mould}: " + ", ".join(f"{name} {value}" for name, value in rows.items())
+    opt.report(sentence, numbers | {"picture": output, "geojson": geojson}, as_json)

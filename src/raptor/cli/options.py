@@ -5,14 +5,14 @@ from collections.abc import Mapping
 from dataclasses import fields
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from raptor.core.errors import RaptorError
-from raptor.moulds.library import TISSUES
-from raptor.parameters import CellParameters
+import raptor
+
+if TYPE_CHECKING:
+    from raptor.dataset.result import Result
 
 Mould = Annotated[Path, typer.Argument(help="a mould of the library by name, or a GeoJSON, SVG or PNG file")]
 Scale = Annotated[
@@ -29,7 +29,11 @@ Tissue = Annotated[
     str | None,
     typer.Option(help="tissue whose fitted parameters to take, such as glial_1; a flag goes before them"),
 ]
-Tissues = Annotated[Path, typer.Option(help="where tissues are described")]
+Tissues = Annotated[Path | None, typer.Option(help="file that describes tissues, in place of the library's")]
+Surrogate = Annotated[
+    Path | None,
+    typer.Option(help="folder with weights.safetensors and model.json, in place of the shipped surrogate"),
+]
 Output = Annotated[Path, typer.Option(help="netCDF file to write")]
 Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write, PNG or SVG")]
 Json = Annotated[bool, typer.Option("--json", help="print numbers as JSON, for scripts")]
@@ -41,8 +45,8 @@ def cell_parameters(
     kappa_nnn: float | None,
     kappa_nnnn: float | None,
     tissue: str | None = None,
-    tissues: Path = TISSUES,
-) -> CellParameters:
+    tissues: Path | None = None,
+) -> raptor.CellParameters:
     """Parameters from flags, and for those not given from the fit of a tissue.
 
     Raises
@@ -50,17 +54,15 @@ def cell_parameters(
     RaptorError
         Where one is given neither way, the tissue is not known, or a value is out of bounds.
     """
-    values = (delta, kappa_nnn, kappa_nnnn)
-    names = [field.name for field in fields(CellParameters)]
-    given = {name: value for name, value in zip(names, values, strict=True) if value is not None}
+    names = [field.name for field in fields(raptor.CellParameters)]
+    values = zip(names, (delta, kappa_nnn, kappa_nnnn), strict=True)
+    given = {name: value for name, value in values if value is not None}
     if tissue is not None:
-        from raptor.moulds.library.tissues import tissue as tissue_named
-
-        return tissue_named(tissue, tissues).parameters(tissue, given)
+        return raptor.tissue(tissue, tissues).parameters(tissue, given)
     missing = [f"--{name.replace('_', '-')}" for name in names if name not in given]
     if missing:
-        raise RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")
-    return CellParameters(**given)
+        raise raptor.RaptorError(f"parameters are missing: give {', '.join(missing)}, or --tissue NAME")
+    return raptor.CellParameters(**given)
 
 
 def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF file") -> None:
@@ -77,12 +79,14 @@ def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF f
         Where the path is a folder or another file of the command, or its folder does not exist.
     """
     if output.is_dir():
-        raise RaptorError(f"{output} is a folder; give the name of {kind}")
+        raise raptor.RaptorError(f"{output} is a folder; give the name of {kind}")
     folder = output.parent
     if not folder.is_dir():
-        raise RaptorError(f"folder {folder} does not exist; create it or choose another output")
+        raise raptor.RaptorError(f"folder {folder} does not exist; create it or choose another output")
     if any(other is not None and output.resolve() == other.resolve() for other in others):
-        raise RaptorError(f"{output} is another file of this command too; choose another name for {kind}")
+        raise raptor.RaptorError(
+            f"{output} is another file of this command too; choose another name for {kind}"
+        )
 
 
 def require_picture_writable(picture: Path | None, *others: Path | None) -> None:
@@ -92,6 +96,21 @@ def require_picture_writable(picture: Path | None, *others: Path | None) -> None
 
         require_picture(picture)
         require_writable(picture, *others, kind="a picture")
+
+
+def save_picture(what: Any, picture: Path | None) -> None:
+    """Write a picture of what `raptor.plot` draws, where one is asked for."""
+    if picture is not None:
+        from raptor.plotting import save_picture
+
+        save_picture(raptor.plot(what), picture)
+
+
+def finish(result: "Result", output: Path, picture: Path | None, as_json: bool) -> None:
+    """Write a tissue or a prediction and its picture, and say what it is."""
+    raptor.save(result, output)
+    save_picture(result, picture)
+    report(f"{output}: {result}", result.numbers | {"output": output, "picture": picture}, as_json)
 
 
 def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
@@ -104,8 +123,6 @@ def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
-    if isinstance(value, np.generic):
-        value = value.item()
     if isinstance(value, float) and not isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value

@@ -2,7 +2,7 @@
 
 import re
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import nan
 from pathlib import Path
@@ -19,7 +19,7 @@ from raptor.condor.minimise import Minimum
 from raptor.condor.system import System, build_system, cast_state
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
-from raptor.fields.labelled import labelled
+from raptor.fields.labelled import MEASURES, labelled
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
@@ -205,11 +205,16 @@ class Tissue:
             self.rasterised(pixels),
             cast,
             self.parameters,
-            title="A tissue simulated by CONDOR",
+            {name: getattr(self, name) for name in MEASURES},
+            method="simulation",
             threshold=cast.threshold,
             accuracy=self.accuracy,
             seed=self.seed,
         )
+
+    def to_dataset(self) -> "xr.Dataset":
+        """The fields on the paper's raster: what is drawn of a tissue, and written to its file."""
+        return self.fields()
 
     def rasterised(self, pixels: int = PIXELS) -> NDArray[np.float64]:
         """The eight fields as one array (8, y, x) in the order `symmetry.FIELDS`, per pixel."""
@@ -223,9 +228,23 @@ class Tissue:
             return nan, nan
         return float(area), float(width)
 
+    @property
+    def numbers(self) -> dict[str, float | int | bool | str]:
+        """What was simulated and what came of it, by name."""
+        return {
+            "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
+            "accuracy": self.accuracy, "seed": self.seed, "cells": self.cells, "energy": self.energy,
+            "converged": self.converged, "inverted_fraction": self.inverted_fraction,
+            **{name: getattr(self, name) for name in MEASURES}, "wall_time": self.wall_time,
+        }  # fmt: skip
+
     def __str__(self) -> str:
         state = "converged" if self.converged else "NOT converged"
-        return f"{self.cells} cells, energy {self.energy:.5g}, {state}, {self.wall_time:.2f} s"
+        return (
+            f"{self.cells} cells, energy {self.energy:.4g} kappa0 l0^2, {state}, inverted "
+            f"{self.inverted_fraction:.1e}, A/A0 {self.area_ratio:.3f}, w/w0 {self.width_ratio:.3f}, "
+            f"{self.wall_time:.1f} s"
+        )
 
 
 def simulate(

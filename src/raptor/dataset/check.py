@@ -18,6 +18,7 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run, read_design
 from raptor.dataset.examples import mould_images, read_examples, training_scaling
 from raptor.dataset.netcdf import open_file
+from raptor.dataset.result import CELLS
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
@@ -65,9 +66,8 @@ def check(path: Path, part: float = 1.0) -> list[str]:
         return list(check_shard(path))
     if {"fields", "n_cells"} <= names:
         return list(check_stack(path))
-    if {"fields", "area_ratio"} <= names:
-        with open_file(path) as file:
-            return [*_check_variables(file, path.name), *_check_field_names(file, path.name)]
+    if set(FIELDS) <= names:
+        return list(check_result(path))
     raise RaptorError(f"{path} is neither a shard nor fields; nothing to check")
 
 
@@ -119,14 +119,26 @@ def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
             yield f"design.csv: mould {run.mould} of simulation {run.simulation} is not in moulds.geojson"
 
 
-def check_shard(path: Path, chosen: set[int] | None = None) -> Iterator[str]:
+def check_result(path: Path) -> Iterator[str]:
+    """The file of one tissue: its fields and masks, and of a simulated one its cells."""
+    with open_file(path) as file:
+        yield from _check_variables(file, Path(path).name)
+        fields = np.stack([file[name][:] for name in FIELDS])
+        depression, tethers = file["depression"][:], file["tethers"][:]
+        n_cells, simulated = int(file.n_cells), CELLS in file.groups
+    yield from _check_fields(fields, depression, tethers, n_cells, Path(path).name)
+    if simulated:
+        yield from check_shard(path, group=CELLS)
+
+
+def check_shard(path: Path, chosen: set[int] | None = None, group: str | None = None) -> Iterator[str]:
     """Energy and tension recomputed from positions and orientations are the stored ones.
 
-    Of the `chosen` simulations, or of all.
+    Of the `chosen` simulations, or of all; of a file, or of the group of one.
     """
     try:
-        shard = read_shard(path)
-        with open_file(path) as file:
+        shard = read_shard(path, group=group)
+        with open_file(path, group) as file:
             yield from _check_variables(file, Path(path).name)
     except RaptorError as error:
         yield str(error)
@@ -166,7 +178,7 @@ def check_stack(path: Path) -> Iterator[str]:
     first_seen: dict[bytes, tuple[int, str]] = {}  # not samples: they would all stay in memory
     for sample in read_samples(path, range(len(table.split))):
         where = f"{Path(path).name}: simulation {sample.simulation}"
-        yield from _check_fields(sample, where)
+        yield from _check_fields(sample.fields, sample.depression, sample.tethers, sample.n_cells, where)
         for image in mould_images(sample):
             other, split = first_seen.setdefault(image, (sample.simulation, sample.split))
             if split != sample.split:
@@ -200,8 +212,11 @@ def _check_variables(file: Any, name: str, *, images: bool = True) -> Iterator[s
                 yield f"{name}: NaN or infinity in {variable.name}"
 
 
-def _check_fields(sample: Sample, where: str) -> Iterator[str]:
-    fields = {name: field.astype(np.float64) for name, field in zip(FIELDS, sample.fields, strict=True)}
+def _check_fields(
+    stack: NDArray[Any], depression: NDArray[Any], tethers: NDArray[Any], n_cells: int, where: str
+) -> Iterator[str]:
+    """Invariants of one tissue's fields (8, y, x) in its masks (y, x)."""
+    fields = {name: field.astype(np.float64) for name, field in zip(FIELDS, stack, strict=True)}
     for name, field in fields.items():
         if not np.isfinite(field).all():
             yield f"{where}: NaN or infinity in {name}"
@@ -211,17 +226,17 @@ def _check_fields(sample: Sample, where: str) -> Iterator[str]:
     trace = fields["sxsx"] + fields["sysy"] + fields["szsz"]
     if np.abs(trace - density).max() > small:
         yield f"{where}: sxsx + sysy + szsz is not density (off by {np.abs(trace - density).max():.3g})"
-    if abs(density.sum() / sample.n_cells - 1) > 1e-3:
-        yield f"{where}: density sums to {density.sum():.6g}, the tissue has {sample.n_cells} cells"
+    if abs(density.sum() / n_cells - 1) > 1e-3:
+        yield f"{where}: density sums to {density.sum():.6g}, the tissue has {n_cells} cells"
     if density.min() < 0:
         yield f"{where}: density is negative ({density.min():.3g})"
     for a, b in (("x", "y"), ("x", "z"), ("y", "z")):
         product = fields[f"s{a}s{a}"] * fields[f"s{b}s{b}"]
         if (np.abs(fields[f"s{a}s{b}"]) > np.sqrt(np.maximum(product, 0)) + small).any():
             yield f"{where}: |s{a}s{b}| exceeds sqrt(s{a}s{a} s{b}s{b}): orientation tensor not positive"
-    if (sample.depression & sample.tethers).any():
+    if (depression & tethers).any():
         yield f"{where}: depression and tethers overlap"
-    away = distance_transform_edt(sample.depression == 0) * pixel_size(density.shape[-1])
+    away = distance_transform_edt(depression == 0) * pixel_size(density.shape[-1])
     deep = away > DEEP + WALL_YIELD + pixel_size(density.shape[-1])
     if (density[deep] > small).any():
         yield f"{where}: density of {density[deep].max():.3g} deep in a tether or outside the depression"

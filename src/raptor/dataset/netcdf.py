@@ -26,23 +26,26 @@ def create(path: Path, title: str, configuration: str) -> Iterator[netCDF4.Datas
     `configuration` is the hash of the configuration block that the file depends on.
     """
     with atomic_path(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
-        file.setncatts(
-            {
-                "Conventions": "CF-1.11",
-                "title": title,
-                "source": f"RAPTOR {__version__}, model version {MODEL_VERSION}",
-                "model_version": np.int64(MODEL_VERSION),
-                "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} written by RAPTOR {__version__}",
-                "references": REFERENCES,
-                "configuration": configuration,
-            }
-        )
+        file.setncatts(header(title, configuration))
         yield file
 
 
+def header(title: str, configuration: str) -> dict[str, Any]:
+    """The attributes that every file has; `configuration` as `create` takes it."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "source": f"RAPTOR {__version__}, model version {MODEL_VERSION}",
+        "model_version": np.int64(MODEL_VERSION),
+        "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} written by RAPTOR {__version__}",
+        "references": REFERENCES,
+        "configuration": configuration,
+    }
+
+
 @contextmanager
-def open_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Open a netCDF file for reading.
+def open_file(path: Path, group: str | None = None) -> Iterator[netCDF4.Dataset]:
+    """Open a netCDF file, or a group of it, for reading.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def open_file(path: Path) -> Iterator[netCDF4.Dataset]:
         ) from error
     with file:
         file.set_auto_mask(False)
-        yield file
+        yield file if group is None else file[group]
 
 
 def variable(

@@ -1,6 +1,6 @@
 """Shards: simulations as files, CF contiguous ragged arrays of cells."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,17 +87,9 @@ def write_shard(
     """Write the simulations of runs, by id, made on a device, as one shard, whole or not at all."""
     failures = failures or {}
     with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
-        file.featureType = "point"
-        write_model(file, model, accuracy, device)
         made = [run for run in runs if run.simulation in simulations]
-        ordered = [simulations[run.simulation] for run in made]
-        file.createDimension("simulation", len(made))
-        file.createDimension("cell", sum(s.cells for s in ordered))
-        _write_simulations(file, made, ordered)
-        empty = np.empty((0, len(CELL_VARIABLES)))
-        columns = np.concatenate([empty, *(_columns(s) for s in ordered)]).astype(np.float32)
-        for (name, long_name), column in zip(CELL_VARIABLES.items(), columns.T, strict=True):
-            variable(file, name, ("cell",), column, long_name)
+        write_model(file, model, accuracy, device)
+        write_simulations(file, made, [simulations[run.simulation] for run in made])
         if failures:
             file.createDimension("failure", len(failures))
             ids = np.array(list(failures), dtype=np.int32)
@@ -115,7 +107,11 @@ def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str, devic
     file.device = device  # on a GPU in single precision
 
 
-def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list[Tissue]) -> None:
+def write_simulations(file: netCDF4.Dataset, runs: Sequence[Run], simulations: Sequence[Tissue]) -> None:
+    """Write the simulations of runs and their cells into a file, or a group of one, that is still empty."""
+    file.featureType = "point"
+    file.createDimension("simulation", len(runs))
+    file.createDimension("cell", sum(s.cells for s in simulations))
     along = ("simulation",)
     ids = np.array([run.simulation for run in runs], dtype=np.int32)
     variable(file, "simulation", along, ids, "simulation id")
@@ -133,6 +129,10 @@ def _write_simulations(file: netCDF4.Dataset, runs: list[Run], simulations: list
         variable(file, name, along, values, long_name)
     times = np.array([s.wall_time for s in simulations])
     variable(file, "wall_time", along, times, "wall time of the simulation", "s")
+    empty = np.empty((0, len(CELL_VARIABLES)))
+    columns = np.concatenate([empty, *(_columns(s) for s in simulations)]).astype(np.float32)
+    for (name, text), column in zip(CELL_VARIABLES.items(), columns.T, strict=True):
+        variable(file, name, ("cell",), column, text)
 
 
 def _columns(simulation: Tissue) -> NDArray[np.float64]:
@@ -161,8 +161,8 @@ def _read_failures(file: netCDF4.Dataset) -> dict[int, str]:
 
 
 @contextmanager
-def _open_shard(path: Path, configuration: str | None) -> Iterator[netCDF4.Dataset]:
-    with open_file(path) as file:
+def _open_shard(path: Path, configuration: str | None, group: str | None = None) -> Iterator[netCDF4.Dataset]:
+    with open_file(path, group) as file:
         if configuration is not None and (
             getattr(file, "configuration", None) != configuration
             or getattr(file, "model_version", None) != MODEL_VERSION
@@ -174,15 +174,15 @@ def _open_shard(path: Path, configuration: str | None) -> Iterator[netCDF4.Datas
         yield file
 
 
-def read_shard(path: Path, configuration: str | None = None) -> Shard:
-    """Read a shard; with `configuration`, only one of that configuration.
+def read_shard(path: Path, configuration: str | None = None, group: str | None = None) -> Shard:
+    """Read a shard, or the group of a file that is one; with `configuration`, only one of that configuration.
 
     Raises
     ------
     RaptorError
         Where the file is missing, cut short, incomplete, or of another configuration or model.
     """
-    with _open_shard(path, configuration) as file:
+    with _open_shard(path, configuration, group) as file:
         try:
             shells = [int(shell) for shell in np.atleast_1d(file.shells)]
             model = NetworkModel(

@@ -27,17 +27,29 @@ LONG_NAMES = {
     "sxsz": "sum over cells of sx sz, per pixel", "sysz": "sum over cells of sy sz, per pixel",
 }  # fmt: skip
 
+MEASURES = {
+    "area_ratio": "A/A0: area of the tissue over its area as cast",
+    "width_ratio": "w/w0: width of the tissue on the central section over its width as cast",
+}
+
 
 def labelled(
-    fields: NDArray[np.floating], cast: CastMould, parameters: CellParameters, **attributes: Any
+    fields: NDArray[np.floating],
+    cast: CastMould,
+    parameters: CellParameters,
+    measures: Mapping[str, Any],
+    **attributes: Any,
 ) -> "xr.Dataset":
-    """Fields (8, y, x) as a Dataset of eight variables (y, x), with masks, parameters and mould.
+    """Fields (8, y, x) as a Dataset of eight variables (y, x), with all that is needed to draw them again.
 
-    Coordinates are `x` and `y` (pixel centres, l0), the masks `depression` and `tethers` (y, x) and the three
-    parameters; the attribute `mould` is the mould as GeoJSON (`mould_of` reads it).
+    Coordinates are `x` and `y` (pixel centres, l0), the masks `depression` and `tethers` (y, x), the three
+    parameters and the measures. The attribute `mould` is the mould as GeoJSON, which `mould_of` reads, and
+    `frame_size` the side of the image, l0.
 
     Parameters
     ----------
+    measures : mapping
+        Numbers of `MEASURES`, by name.
     attributes : Any
         Further attributes of the Dataset, such as `threshold`.
 
@@ -49,19 +61,23 @@ def labelled(
     import xarray as xr  # here: what only simulates need not wait for it
 
     plane = ("y", "x")
-    along = {axis: (axis, pixel_centres(cast.pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
+    axes = {axis: (axis, pixel_centres(cast.pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
     masks = {
         "depression": (plane, cast.depression, named("whether cells may be there")),
         "tethers": (plane, cast.tethers, named("whether a tether stands there")),
     }
-    values = {name: ((), value, named(PARAMETERS[name])) for name, value in asdict(parameters).items()}
+    numbers = {
+        name: ((), value, named((PARAMETERS | MEASURES)[name]))
+        for name, value in {**asdict(parameters), **measures}.items()
+    }
     return xr.Dataset(
         {name: (plane, image, named(LONG_NAMES[name])) for name, image in zip(FIELDS, fields, strict=True)},
-        {**along, **masks, **values},
+        {**axes, **masks, **numbers},
         {
             "mould": json.dumps(cast.mould.as_feature()),
             "frame_size": IMAGE_SIZE,
             "layers": cast.layers,
+            "n_cells": cast.n_cells,
             **attributes,
         },
     )

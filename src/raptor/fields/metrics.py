@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.core.arrays import Array, library_of
-from raptor.raster import normalised
 from raptor.symmetry import FIELDS
 
 BULK = ("P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar")
@@ -47,6 +46,11 @@ def pearson(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
 def field_pearson(prediction: NDArray[np.floating], target: NDArray[np.floating]) -> list[float]:
     """Pearson's correlation over pixels, a field, of one sample (fields, y, x)."""
     return [pearson(p.ravel(), t.ravel()) for p, t in zip(prediction, target, strict=True)]
+
+
+def normalised(fields: NDArray[np.floating], cells: int) -> NDArray[np.floating]:
+    """Zbar_p = (N_p / N_c) Z_p, whose mean over pixels is the mean over cells (paper, eq. 5)."""
+    return np.asarray(fields * (fields.shape[-1] * fields.shape[-2] / cells))
 
 
 def bulk_statistics(fields: NDArray[np.floating], cells: int, threshold: float) -> dict[str, float]:

@@ -1,16 +1,19 @@
 """A fit as a user asks for it: ratios or an outline, by the surrogate or by the simulator."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.condor.simulate import PIXELS
 from raptor.core.errors import RaptorError
 from raptor.fields.shape import shape_ratios
+from raptor.fitting.fitted import FittedTissue
 from raptor.fitting.least_squares import Minimum, Residuals, minimise
-from raptor.fitting.outline import Densities, Outline, deviations, outline_measure
+from raptor.fitting.outline import Densities, Outline, deviations, outline_measure, read_outline
 from raptor.fitting.posterior import infer, summarise, survey
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
 from raptor.fitting.space_mapping import correct
@@ -24,15 +27,19 @@ from raptor.fitting.targets import (
     unit_of,
 )
 from raptor.moulds.geometry import Mould
-from raptor.parameters import CellParameters
+from raptor.moulds.reading import as_mould
+from raptor.parameters import CellParameters, NetworkModel, require_parameters
 from raptor.raster import density_threshold
+from raptor.surrogate.command import load_surrogate
+from raptor.surrogate.inference import Surrogate
 
-if TYPE_CHECKING:  # tables and figures do not wait for torch
-    from raptor.surrogate.inference import Surrogate
+By = Literal["surrogate", "simulator"]
+"""What a fit asks."""
 
 STARTS = 128
 POINTS = 128  # of the survey behind intervals
 RATIO_ERROR, OUTLINE_ERROR = 0.01, 0.25
+LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
 CORRECTED = 4  # the part of simulations that correct the surrogate's fit is one over this
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval
 
@@ -86,50 +93,135 @@ class Request:
         return np.array([self.simulator.fields(run)[0] for run in runs])
 
 
-def fit_for(request: Request) -> tuple[dict[str, Any], NDArray[np.floating]]:
-    """The fit as JSON holds it, and the density (y, x) of the tissue there.
+def fit(
+    mould: Mould | str | Path,
+    area_ratio: float | None = None,
+    width_ratio: float | None = None,
+    *,
+    outline: Outline | str | Path | None = None,
+    by: By = "surrogate",
+    surrogate: Surrogate | str | Path | None = None,
+    start: CellParameters | None = None,
+    layers: int | None = None,
+    accuracy: str = "standard",
+    simulations: int = 40,
+    error: float | None = None,
+    seed: int = 0,
+) -> FittedTissue:
+    """Fit delta, kappa_nnn and kappa_nnnn to a tissue in its mould, and say what is left open.
 
-    `intervals` hold 95 % of each parameter: for ratios those of the posterior by the surrogate, where it is
-    calibrated; for an outline those that its slope at the fit gives; `reachable` is None where nothing tells.
+    Two ratios cannot determine three parameters: the intervals are those of the valley (docs/fits.md). For
+    ratios they are those of the posterior by the surrogate, for an outline those that its slope at the fit
+    gives.
+
+    Parameters
+    ----------
+    mould : Mould, str or Path
+        A mould, or what `read_mould` reads: a name of the library, or a file.
+    area_ratio, width_ratio : float, optional
+        Measured A/A0 and w/w0, one or both.
+    outline : Outline, str or Path, optional
+        The tissue's outline, in place of ratios: a picture of it, cropped to the frame of 62.5 l0.
+    by : str
+        "surrogate", or "simulator": from the surrogate's fit on by simulations.
+    surrogate : Surrogate, str, Path or None
+        Or the folder of one; None for the shipped surrogate.
+    start : CellParameters, optional
+        Where a fit by the simulator begins; no surrogate is asked then.
+    layers : int, optional
+        Cell layers of simulations; those of the surrogate, or 7 where there is none.
+    accuracy : str
+        Of simulations, as `simulate` takes it.
+    simulations : int
+        That a fit may make.
+    error : float, optional
+        Standard error of a ratio (0.01), or of the outline (0.25 l0).
+    seed : int
+        Of every random number.
 
     Raises
     ------
     RaptorError
-        Where what was measured cannot be measured on the mould.
+        Where an argument is none that is allowed, or what was measured cannot be measured on the mould.
+
+    Examples
+    --------
+    >>> found = fit("glial_1", area_ratio=0.81, width_ratio=0.80)
     """
+    if by not in get_args(By):
+        raise RaptorError(f"a fit by '{by}' is asked for; allowed are {', '.join(get_args(By))}")
+    if start is not None:
+        if by == "surrogate":
+            raise RaptorError(
+                'parameters are where the simulator starts; ask it too: by="simulator", or --by simulator'
+            )
+        start = require_parameters(start).require_sampled("fit")
+    target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
+    if start is not None:
+        surrogate = None
+    elif not isinstance(surrogate, Surrogate):
+        surrogate = load_surrogate(surrogate)
+    if surrogate is not None and layers not in (None, surrogate.layers):
+        raise RaptorError(
+            f"layers is {layers}, but this surrogate is of {surrogate.layers}; leave it out, or start the "
+            "simulator from parameters of your own"
+        )
+    model = NetworkModel(surrogate.layers if surrogate is not None else layers or 7)
+    simulator = Simulator(model, accuracy, surrogate.pixels if surrogate else PIXELS, seed)
+    return _fit(Request(mould, target, simulator, surrogate, start, by == "simulator", simulations, error))
+
+
+def _target(
+    area_ratio: float | None, width_ratio: float | None, outline: Outline | str | Path | None
+) -> Target | Outline:
+    """What was measured: ratios, or an outline."""
+    ratios = {"area ratio": area_ratio, "width ratio": width_ratio}
+    given = {name: value for name, value in ratios.items() if value is not None}
+    if bool(given) + (outline is not None) != 1:
+        raise RaptorError(
+            "give what was measured in one way: the area ratio, the width ratio, both, or an outline"
+        )
+    for name, value in given.items():
+        if not 0 < value <= LARGEST_RATIO:
+            raise RaptorError(
+                f"the {name} is {value}; a ratio to the tissue as cast lies between 0 and {LARGEST_RATIO}"
+            )
+    if outline is None:
+        return Target(area_ratio, width_ratio)
+    return outline if isinstance(outline, Outline) else read_outline(Path(outline))
+
+
+def _fit(request: Request) -> FittedTissue:
+    """The fit that is asked for."""
     found, measure, densities = _search(request)
     density = densities([found.parameters])[0]
     area, width = map(float, shape_ratios(density, request.simulator.cast(request.mould), request.threshold))
-    fitted = {
-        "parameters": asdict(found.parameters),
-        "area_ratio": area,
-        "width_ratio": width,
-        "rss": found.rss,
-        "rank": found.rank,
-        "evaluations": found.evaluations,
-    }
-    content: dict[str, Any] = {
-        "mould": request.mould.name,
-        "by": "simulator" if request.by_simulator else "surrogate",
-        "layers": request.simulator.model.layers,
-        "target": asdict(request.target if isinstance(request.target, Target) else Target(None, None)),
-        "fit": fitted,
-        "intervals": {},
-        "reachable": None,
-    }
+    intervals: dict[str, tuple[float, float]] = {}
+    posterior: dict[str, Any] = {}
     if isinstance(request.target, Outline):
-        fitted["distance"] = float(np.sqrt(found.rss))
-        content["intervals"] = _intervals(request, request.target, measure, found)
+        intervals = _intervals(request, request.target, measure, found)
     elif request.surrogate is not None and request.surrogate.calibration is not None:
-        content |= _posterior(request, request.surrogate, request.target)
-    return content, density
+        posterior = _posterior(request, request.surrogate, request.target)
+        quantiles = {name: known["quantiles"] for name, known in posterior["parameters"].items()}
+        intervals = {name: (known["0.025"], known["0.975"]) for name, known in quantiles.items()}
+    return FittedTissue(
+        request.mould,
+        request.target,
+        "simulator" if request.by_simulator else "surrogate",
+        request.simulator.model.layers,
+        found,
+        area,
+        width,
+        intervals,
+        posterior.get("reachable"),
+        posterior,
+        density,
+        request.threshold,
+    )
 
 
 def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
     """The minimum, by the surrogate, or from there or the start on by the simulator."""
-    if request.surrogate is None and (request.start is None or not request.by_simulator):
-        raise RaptorError("a fit needs a surrogate, or parameters from which the simulator starts")
-    start = None if request.start is None else unit_of(request.start)
     if request.surrogate is not None:
         (start_by, residuals), (measure, _) = (
             request.measure(
@@ -144,9 +236,10 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
         if not request.by_simulator:
             return found, measure, surrogate_densities(request.surrogate, request.mould, averaged=True)
         return _corrected(request, found, measure)
-    assert start is not None
+    assert request.start is not None, "a fit needs a surrogate or a start"
     measure, residuals = _by_simulation(request)
-    return descend_by_simulation(measure, residuals, start, request.simulations), measure, request.simulated
+    found = descend_by_simulation(measure, residuals, unit_of(request.start), request.simulations)
+    return found, measure, request.simulated
 
 
 def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Minimum, Measure, Densities]:
@@ -167,20 +260,15 @@ def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
     return request.measure(request.simulated, request.simulator.measure(request.mould), request.threshold)
 
 
-def _posterior(request: Request, surrogate: "Surrogate", target: Target) -> dict[str, Any]:
-    """Intervals of the posterior, and whether the target can be reached."""
+def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:
+    """The posterior in numbers."""
     seen = survey(surrogate, request.mould, POINTS, request.simulator.seed)
-    summary = summarise(infer(seen, target, request.error or RATIO_ERROR, request.simulator.seed))
-    ends = {
-        name: {"lower": found["quantiles"]["0.025"], "upper": found["quantiles"]["0.975"]}
-        for name, found in summary["parameters"].items()
-    }
-    return {"intervals": ends, "reachable": summary["reachable"], "posterior": summary}
+    return summarise(infer(seen, target, request.error or RATIO_ERROR, request.simulator.seed))
 
 
 def _intervals(
     request: Request, outline: Outline, measure: Measure, found: Minimum
-) -> dict[str, dict[str, float]]:
+) -> dict[str, tuple[float, float]]:
     """95 % intervals of a fit to an outline, by its slope; none where a combination is left open."""
     step = {"step": STEP} if request.by_simulator else {}
     errors = deviations(measure, found, outline, request.error or OUTLINE_ERROR, **step)
@@ -188,4 +276,4 @@ def _intervals(
         return {}
     middle = as_array([found.parameters])[0]
     ends = zip(PARAMETERS, middle - NORMAL * errors, middle + NORMAL * errors, strict=True)
-    return {name: {"lower": float(low), "upper": float(high)} for name, low, high in ends}
+    return {name: (float(low), float(high)) for name, low, high in ends}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import shapely
 
+from raptor.moulds.cast import cast_sites
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import GROUPS
 from raptor.symmetry import Element
@@ -27,6 +28,8 @@ class Summary:
         Their number.
     symmetry : str
         Its class, a key of `random_moulds.GROUPS`, found from its shape.
+    layers, cells : int
+        Cells of so many layers cast in it.
     """
 
     mould: str
@@ -35,14 +38,46 @@ class Summary:
     area: float
     tethers: int
     symmetry: str
+    layers: int
+    cells: int
+
+    @property
+    def rows(self) -> dict[str, str]:
+        """What it says, by name, for people."""
+        return {
+            "mould": self.mould,
+            "size": f"{self.width:.4g} x {self.height:.4g} l0",
+            "area": f"{self.area:.5g} l0^2",
+            "tethers": f"{self.tethers}",
+            "symmetry": self.symmetry.replace("_", " "),
+            "cells": f"{self.cells:,} in {self.layers} layers",
+        }
 
 
-def summarise(mould: Mould) -> Summary:
-    """Measure a mould."""
+def summarise(mould: Mould, layers: int = 7) -> Summary:
+    """Measure a mould, and cast so many layers in it.
+
+    Raises
+    ------
+    RaptorError
+        Where it holds no cell.
+    """
     x0, y0, x1, y1 = mould.outline.bounds
     return Summary(
-        mould.name, x1 - x0, y1 - y0, mould.depression.area, len(mould.tethers), symmetry_class(mould)
+        mould.name,
+        x1 - x0,
+        y1 - y0,
+        mould.depression.area,
+        len(mould.tethers),
+        symmetry_class(mould),
+        layers,
+        len(cast_sites(mould, layers)),
     )
+
+
+def area_apart(mould: Mould, other: Mould) -> float:
+    """Area that belongs to one depression alone, over that of the other mould's."""
+    return float(mould.depression.symmetric_difference(other.depression).area / other.depression.area)
 
 
 def symmetry_class(mould: Mould) -> str:

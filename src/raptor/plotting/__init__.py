@@ -1,55 +1,9 @@
-"""Figures. Each function draws onto a new figure from plain data; `save` writes it."""
+"""Figures. Each function draws onto a new figure from plain data; `save` writes it, and `plot` knows which.
 
-from raptor.plotting.drawing import (
-    bulk_figure,
-    design_figure,
-    draw_mould,
-    fields_figure,
-    folding_figure,
-    mould_figure,
-    new_figure,
-    require_picture,
-    save,
-    save_fields,
-    save_picture,
-    show_field,
-    tradeoff_figure,
-)
-from raptor.plotting.evaluation import (
-    calibration_figure,
-    enrichment_figure,
-    models_figure,
-    regions_figure,
-    training_figure,
-    worst_figure,
-)
-from raptor.plotting.fits import fit_figure, valley_figure
-from raptor.plotting.sweep import contraction_figure, directors_figure, panels_figure, save_panels
+Names are those of `__init__.pyi`; each is imported when it is first used, so that no figure waits for
+another's libraries.
+"""
 
-__all__ = [
-    "bulk_figure",
-    "calibration_figure",
-    "contraction_figure",
-    "design_figure",
-    "directors_figure",
-    "draw_mould",
-    "enrichment_figure",
-    "fields_figure",
-    "fit_figure",
-    "folding_figure",
-    "models_figure",
-    "mould_figure",
-    "new_figure",
-    "panels_figure",
-    "regions_figure",
-    "require_picture",
-    "save",
-    "save_fields",
-    "save_panels",
-    "save_picture",
-    "show_field",
-    "tradeoff_figure",
-    "training_figure",
-    "valley_figure",
-    "worst_figure",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

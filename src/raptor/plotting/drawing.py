@@ -2,25 +2,29 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from raptor.condor.simulate import Tissue
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.fields.metrics import BULK
 from raptor.frame import IMAGE_SIZE
+from raptor.moulds.cast import cast_sites
 from raptor.moulds.geometry import Mould
 from raptor.symmetry import FIELDS
+
+if TYPE_CHECKING:  # what other figures wait for
+    import pandas as pd
+
+    from raptor.condor.simulate import Tissue
 
 SEQUENTIAL, DIVERGING = "cividis", "PuOr"  # perceptually uniform; safe for the colour-blind
 SIMULATED, PREDICTED, THIRD = "#33508a", "#d98c21", "#6b6b6b"
@@ -44,10 +48,19 @@ METADATA: dict[str, dict[str, None]] = {".png": {"Software": None}, ".svg": {"Da
 HALF = IMAGE_SIZE / 2
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows as it stands, pyplot or not."""
+
+    def _repr_png_(self) -> bytes:
+        file = BytesIO()
+        self.savefig(file, format="png")
+        return file.getvalue()
+
+
 @STYLED
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure, size in inches."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def save(figure: Figure, stem: Path) -> None:
@@ -135,16 +148,12 @@ def fields_figure(stacks: Mapping[str, NDArray[np.floating]], mould: Mould) -> F
 
 
 @STYLED
-def mould_figure(
-    mould: Mould, sites: NDArray[np.float64], numbers: Mapping[str, Any], like: Mould | None = None
-) -> Figure:
-    """A mould as the model sees it.
+def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = None) -> Figure:
+    """A mould as the model sees it, with the cells of its lowest layer.
 
     Parameters
     ----------
-    sites : ndarray (cells, 2)
-        Where cells of one layer stand, l0.
-    numbers : mapping
+    rows : mapping
         What the title says, by name.
     like : Mould, optional
         Another mould, whose outline is drawn beside this one's, dashed.
@@ -152,6 +161,7 @@ def mould_figure(
     figure = new_figure(5.2, 5.8)
     axes = figure.add_subplot()
     draw_mould(axes, mould)
+    sites = cast_sites(mould, 1)
     axes.plot(sites[:, 0], sites[:, 1], ".", ms=1.5, color=SIMULATED, rasterized=True)
     if like is not None:
         for shape in (like.outline, *(tether.polygon for tether in like.tethers)):
@@ -159,14 +169,14 @@ def mould_figure(
     axes.plot([-HALF + 2, -HALF + 12], [-HALF + 2] * 2, "-", color="black", lw=2, solid_capstyle="butt")
     axes.text(-HALF + 7, -HALF + 2.8, "10 $l_0$", ha="center", va="bottom")
     axes.spines[:].set_visible(True)  # the frame is part of what the model sees
-    width = max(len(name) for name in numbers)
-    table = [f"{name:>{width}}  {value}" for name, value in numbers.items()]
+    width = max(len(name) for name in rows)
+    table = [f"{name:>{width}}  {value}" for name, value in rows.items()]
     axes.set_title("\n".join(table), loc="left", family="monospace", fontsize=8)
     return figure
 
 
 @STYLED
-def bulk_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
+def bulk_figure(metrics: "pd.DataFrame", summary: Mapping[str, Any]) -> Figure:
     """The paper's scatter: eight bulk statistics, predicted against simulated, and their r."""
     figure = new_figure(10.5, 5.6)
     for axes, name in zip(figure.subplots(2, 4).ravel(), BULK, strict=True):
@@ -177,7 +187,7 @@ def bulk_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
+def scatter(axes: Axes, simulated: "pd.Series", predicted: "pd.Series") -> None:
     """Predicted against simulated, with the line of perfect agreement."""
     low = float(min(simulated.min(), predicted.min()))
     high = float(max(simulated.max(), predicted.max()))
@@ -189,7 +199,7 @@ def scatter(axes: Axes, simulated: pd.Series, predicted: pd.Series) -> None:
 
 
 @STYLED
-def design_figure(table: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
+def design_figure(table: "pd.DataFrame", moulds: Sequence[Mould]) -> Figure:
     """Distributions of a design, and moulds drawn.
 
     Parameters
@@ -228,7 +238,7 @@ def design_figure(table: pd.DataFrame, moulds: Sequence[Mould]) -> Figure:
 
 
 @STYLED
-def tradeoff_figure(table: pd.DataFrame) -> Figure:
+def tradeoff_figure(table: "pd.DataFrame") -> Figure:
     """Error of density, and energy, against cost: one small point a case, a large median a method.
 
     Energies less than 0.1 % above the best are drawn at 0.1 %.
@@ -266,7 +276,7 @@ def tradeoff_figure(table: pd.DataFrame) -> Figure:
 
 @STYLED
 def folding_figure(
-    tissues: Mapping[str, Tissue], shares: Mapping[str, NDArray[np.float64]], mould: Mould
+    tissues: Mapping[str, "Tissue"], shares: Mapping[str, NDArray[np.float64]], mould: Mould
 ) -> Figure:
     """Tissues from above, cells coloured by the share (cells,) of their bonds that are reversed."""
     figure = new_figure(9.0, 3.2)
@@ -297,6 +307,8 @@ def _method_colour(method: str) -> str:
 
 def save_fields(path: Path, stacks: Mapping[str, NDArray[np.floating]]) -> None:
     """Write the field stacks (8, y, x) that a figure draws, by name, as netCDF."""
+    import xarray as xr
+
     data = xr.Dataset(
         {
             name: (("field", "y", "x"), stack.astype(np.float32), {"long_name": name, "units": "1"})

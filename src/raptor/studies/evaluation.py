@@ -108,7 +108,7 @@ def evaluate(
     for sample in read_samples(stack, read_table(stack).rows("test")):
         cast = CastMould(moulds[sample.mould], layers, sample.fields.shape[-1])
         guess = predict(sample, cast)
-        prediction = guess.fields if isinstance(guess, Prediction) else guess
+        prediction = guess.values if isinstance(guess, Prediction) else guess
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
         row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}
         row |= field_errors(prediction, sample.fields, sample)
@@ -127,7 +127,7 @@ def evaluate(
 def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict[str, Any]:
     """What the bands hold, and the flag."""
     inside = sample.depression.astype(bool)
-    held = guess.field_bands.hold(without_sign(guess.fields) - without_sign(sample.fields))
+    held = guess.field_bands.hold(without_sign(guess.values) - without_sign(sample.fields))
     true = np.array([row[f"{name}_simulated"] for name in SHAPES])
     shapes = guess.ratio_bands.hold(guess.ratios - true)
     found: dict[str, Any] = {}

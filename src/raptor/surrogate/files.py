@@ -2,11 +2,9 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
@@ -15,18 +13,13 @@ from torch import Tensor
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.core.version import MODEL_VERSION
-from raptor.dataset.netcdf import create, variable
 from raptor.dataset.scaling import Scaling
-from raptor.frame import pixel_centres
-from raptor.surrogate.bands import LEVELS, Calibration
+from raptor.surrogate.bands import Calibration
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
-from raptor.surrogate.prediction import Prediction
 from raptor.surrogate.rules import Architecture
-from raptor.symmetry import FIELDS
 
 SHIPPED = Path(__file__).parent / "shipped"
-WIDEST = 1.96  # standard deviations of a normal error in the widest band
 DESCRIPTORS = "training_descriptors"  # beside the weights
 WEIGHTS, MODEL = "weights.safetensors", "model.json"
 
@@ -132,36 +125,3 @@ def _of_member(tensors: Mapping[str, Tensor], number: int) -> dict[str, Tensor]:
     prefix = f"{number}."
     part = {name.removeprefix(prefix): v for name, v in tensors.items() if name.startswith(prefix)}
     return {name: v.float() if v.dtype == torch.float16 else v for name, v in part.items()}
-
-
-def write_prediction(path: Path, prediction: Prediction) -> None:
-    """Write a prediction, in physical units, with standard deviations of its error."""
-    pixels = prediction.fields.shape[-1]
-    with create(path, "Fields of a tissue predicted by the RAPTOR surrogate", "prediction") as file:
-        file.mould = prediction.cast.mould.name
-        file.threshold = prediction.threshold  # density per pixel above which there is tissue in these fields
-        sizes = {"sample": 1, "level": len(LEVELS), "field": len(FIELDS), "y": pixels, "x": pixels}
-        for name, size in sizes.items():
-            file.createDimension(name, size)
-        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
-        variable(file, "level", ("level",), LEVELS, "share of simulations that a band holds")
-        for axis in "yx":
-            variable(file, axis, (axis,), pixel_centres(pixels), f"pixel centre {axis}, in l0")
-        image = ("field", "y", "x")
-        variable(file, "fields", ("sample", *image), prediction.fields[None], "fields, per pixel")
-        deviation = prediction.field_bands.half[-1][None] / WIDEST
-        text = (
-            f"deviation of the error, per pixel: {WIDEST} of it hold {100 * LEVELS[-1]:.0f} % of simulations"
-        )
-        variable(file, "fields_std", ("sample", *image), deviation, text)
-        for name, value in asdict(prediction.parameters).items():
-            variable(file, name, ("sample",), [value], name)
-        for column, (name, text) in enumerate((("area_ratio", "A/A0"), ("width_ratio", "w/w0"))):
-            variable(file, name, ("sample",), [prediction.ratios[column]], text)
-            half = prediction.ratio_bands.half[None, :, column]
-            variable(file, f"{name}_band", ("sample", "level"), half, f"half width of the band of {text}")
-        for name, text in (
-            ("disagreement", "disagreement of the networks over what is usual; above 1 trust nothing"),
-            ("distance", "distance to the training set over what is usual; above 1 trust nothing"),
-        ):
-            variable(file, name, ("sample",), [getattr(prediction, name)], text)

@@ -1,26 +1,34 @@
-"""What a surrogate says of one tissue: fields, ratios, their bands, and how far to trust them."""
+"""What the surrogate says of one tissue, and how far to trust it."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.fields.labelled import labelled, named
 from raptor.moulds.cast import CastMould
+from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
-from raptor.surrogate.bands import Bands
+from raptor.surrogate.bands import LEVELS, Bands
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WIDEST = 1.96  # standard deviations of a normal error in the widest band
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """One tissue, predicted.
+    """One tissue, predicted: what `predict` returns.
 
     Parameters
     ----------
     cast : CastMould
-        The mould, as cast.
     parameters : CellParameters
-    fields : ndarray (8, y, x)
-        In physical units, per pixel, in the order `FIELDS`.
+        What was asked for.
+    values : ndarray (8, y, x)
+        The fields, in the order `symmetry.FIELDS`, per pixel.
     ratios : ndarray (2,)
         A/A0 and w/w0.
     field_bands : Bands
@@ -37,7 +45,7 @@ class Prediction:
 
     cast: CastMould
     parameters: CellParameters
-    fields: NDArray[np.float32]
+    values: NDArray[np.float32]
     ratios: NDArray[np.float64]
     field_bands: Bands
     ratio_bands: Bands
@@ -46,16 +54,98 @@ class Prediction:
     threshold: float
 
     @property
+    def mould(self) -> Mould:
+        """The mould that the tissue is predicted in."""
+        return self.cast.mould
+
+    @property
+    def layers(self) -> int:
+        """Cell layers of the simulations that the surrogate learnt from."""
+        return self.cast.layers
+
+    @property
     def area_ratio(self) -> float:
-        """A/A0, area of the tissue over its area as cast."""
+        """A/A0."""
         return float(self.ratios[0])
 
     @property
     def width_ratio(self) -> float:
-        """w/w0, width of the tissue on the central section over its width as cast."""
+        """w/w0 of the central section; NaN where it holds no tissue as cast."""
         return float(self.ratios[1])
 
     @property
+    def area_ratio_band(self) -> tuple[float, float]:
+        """Ends of the band about A/A0 that holds 95 % of simulations."""
+        return self._band(0)
+
+    @property
+    def width_ratio_band(self) -> tuple[float, float]:
+        """Ends of the band about w/w0 that holds 95 % of simulations."""
+        return self._band(1)
+
+    @property
     def out_of_distribution(self) -> bool:
-        """Whether the input is unlike the training set, or the networks disagree more than they should."""
+        """Whether the input is unlike the training set, or the networks disagree more than they should.
+
+        Bands mean nothing then: simulate.
+        """
         return bool(max(self.disagreement, self.distance) > 1)
+
+    @property
+    def fields(self) -> "xr.Dataset":
+        """The eight fields (y, x) per pixel, named, with masks, parameters, ratios and the mould.
+
+        See `raptor.fields.labelled` for what the Dataset holds.
+        """
+        measures = {"area_ratio": self.area_ratio, "width_ratio": self.width_ratio}
+        about = {"method": "prediction", "threshold": self.threshold}
+        return labelled(self.values, self.cast, self.parameters, measures, **about)
+
+    @property
+    def deviation(self) -> NDArray[np.float32]:
+        """Standard deviation (8, y, x) of the fields' error: 1.96 of it hold 95 % of simulations."""
+        return np.asarray(self.field_bands.half[-1] / WIDEST)
+
+    @property
+    def numbers(self) -> dict[str, float | int | bool | str]:
+        """What is predicted, by name; bands by half widths."""
+        half = self.ratio_bands.half[-1]
+        return {
+            "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
+            "area_ratio": self.area_ratio, "area_ratio_band95": float(half[0]),
+            "width_ratio": self.width_ratio, "width_ratio_band95": float(half[1]),
+            "distance": self.distance, "disagreement": self.disagreement, "unlike": self.out_of_distribution,
+        }  # fmt: skip
+
+    def to_dataset(self) -> "xr.Dataset":
+        """`fields`, each with its deviation (such as `density_std`), and the ratios' bands (level,)."""
+        fields = self.fields
+        share = named("share of simulations that a band holds")
+        added: dict[str, Any] = {"level": ("level", list(LEVELS), share)}
+        for name, half in zip(("area_ratio", "width_ratio"), self.ratio_bands.half.T, strict=True):
+            added[f"{name}_band"] = ("level", half, named(f"half width of the band about {name}"))
+        for name in ("disagreement", "distance"):
+            text = f"{name}, over what is usual; above 1 trust nothing"
+            added[name] = ((), getattr(self, name), named(text))
+        spread = {
+            f"{name}_std": (("y", "x"), image, named(f"standard deviation of the error of {name}, per pixel"))
+            for name, image in zip(fields, self.deviation, strict=True)
+        }
+        return fields.assign_coords(added).assign(spread)
+
+    def __str__(self) -> str:
+        half = self.ratio_bands.half[-1]
+        said = (
+            f"A/A0 {self.area_ratio:.3f} +- {half[0]:.3f}, w/w0 {self.width_ratio:.3f} +- {half[1]:.3f} "
+            f"(95 % bands, {self.layers} layers)"
+        )
+        if self.out_of_distribution:
+            said += (
+                "\nunlike the training set, so do not trust these bands, and simulate: "
+                f"distance {self.distance:.1f}, disagreement {self.disagreement:.1f} (usual: below 1)"
+            )
+        return said
+
+    def _band(self, column: int) -> tuple[float, float]:
+        middle, half = float(self.ratios[column]), float(self.ratio_bands.half[-1, column])
+        return middle - half, middle + half

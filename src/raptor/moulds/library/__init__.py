@@ -7,6 +7,7 @@ moulds are drawn in the paper but not given in numbers: each is an approximation
 the cited experiments say, made before any fit. Lengths in l0.
 """
 
+import json
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
@@ -14,3 +15,9 @@ MOULDS = {path.stem: path for path in sorted(FOLDER.glob("*.geojson"))}
 """Files of the standard moulds, by name."""
 TISSUES = FOLDER / "tissues.yaml"
 """The measured tissues."""
+
+
+def describe(name: str) -> str:
+    """What the file of a standard mould says of it."""
+    document = json.loads(MOULDS[name].read_text(encoding="utf-8"))
+    return str(document["features"][0]["properties"]["description"])

@@ -1,0 +1,56 @@
+# What the room gives, and where each name lives; `plot` is the front door.
+from .drawing import (
+    bulk_figure,
+    design_figure,
+    draw_mould,
+    fields_figure,
+    folding_figure,
+    mould_figure,
+    new_figure,
+    require_picture,
+    save,
+    save_fields,
+    save_picture,
+    show_field,
+    tradeoff_figure,
+)
+from .evaluation import (
+    calibration_figure,
+    enrichment_figure,
+    models_figure,
+    regions_figure,
+    training_figure,
+    worst_figure,
+)
+from .fits import fit_figure, valley_figure
+from .front import plot
+from .sweep import contraction_figure, directors_figure, panels_figure, save_panels
+
+__all__ = [
+    "bulk_figure",
+    "calibration_figure",
+    "contraction_figure",
+    "design_figure",
+    "directors_figure",
+    "draw_mould",
+    "enrichment_figure",
+    "fields_figure",
+    "fit_figure",
+    "folding_figure",
+    "models_figure",
+    "mould_figure",
+    "new_figure",
+    "panels_figure",
+    "plot",
+    "regions_figure",
+    "require_picture",
+    "save",
+    "save_fields",
+    "save_panels",
+    "save_picture",
+    "show_field",
+    "tradeoff_figure",
+    "training_figure",
+    "valley_figure",
+    "worst_figure",
+]

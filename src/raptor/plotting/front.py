@@ -1,0 +1,58 @@
+"""The front door: a picture of whatever the package gives."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from raptor.core.errors import RaptorError
+from raptor.fields.labelled import mould_of
+from raptor.moulds.geometry import Mould
+from raptor.moulds.reading import read_mould
+from raptor.moulds.summary import summarise
+from raptor.plotting.drawing import fields_figure, mould_figure
+from raptor.plotting.fits import fit_figure
+from raptor.symmetry import FIELDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def plot(what: Any) -> Figure:
+    """Draw a mould, a simulated or a predicted tissue, its fields, or a fit.
+
+    Parameters
+    ----------
+    what : Mould, Tissue, Prediction, FittedTissue, xarray.Dataset of fields, str or Path
+        A string or a path is a mould: a name of the library or a file.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its method `savefig` writes it; a notebook shows it as it stands.
+
+    Raises
+    ------
+    RaptorError
+        Where there is no picture of what is given.
+    """
+    if isinstance(what, (str, Path)):
+        what = read_mould(what)
+    if isinstance(what, Mould):
+        return mould_figure(what, summarise(what).rows)
+    if hasattr(what, "density") and hasattr(what, "by"):
+        return fit_figure(what.mould, {what.by: what.density}, {what.by: what.threshold}, what.rows)
+    if hasattr(what, "to_dataset"):
+        what = what.to_dataset()
+    if hasattr(what, "data_vars"):
+        return draw_fields(what)
+    raise RaptorError(
+        f"there is no picture of type {type(what).__name__}; give a mould, a tissue or its fields"
+    )
+
+
+def draw_fields(fields: "xr.Dataset") -> Figure:
+    """The eight fields of one tissue beside its mould."""
+    stack = np.stack([fields[name].to_numpy() for name in FIELDS])
+    return fields_figure({str(fields.attrs.get("method", "")): stack}, mould_of(fields))

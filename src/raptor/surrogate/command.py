@@ -1,0 +1,63 @@
+"""A prediction as a user asks for it."""
+
+from functools import cache
+from pathlib import Path
+
+from raptor.moulds.geometry import Mould
+from raptor.moulds.reading import as_mould
+from raptor.parameters import CellParameters, require_parameters
+from raptor.surrogate.files import SHIPPED, load
+from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.prediction import Prediction
+
+
+def load_surrogate(path: str | Path | None = None) -> Surrogate:
+    """Load a trained surrogate, or the one that comes with the package.
+
+    Parameters
+    ----------
+    path : str, Path or None
+        Folder with weights.safetensors and model.json, such as results/paper/surrogate/model; None for the
+        shipped surrogate.
+
+    Raises
+    ------
+    RaptorError
+        Where a file is missing or cut short, or the weights do not fit the model.
+    """
+    return _shipped() if path is None else load(Path(path))
+
+
+def predict(
+    mould: Mould | str | Path, cells: CellParameters, surrogate: Surrogate | str | Path | None = None
+) -> Prediction:
+    """Predict the tissue of a mould by a surrogate, with bands that hold 50, 80 and 95 % of simulations.
+
+    Parameters
+    ----------
+    mould : Mould, str or Path
+        A mould, or what `read_mould` reads: a name of the library, or a file.
+    cells : CellParameters
+        In the range that the training set covers.
+    surrogate : Surrogate, str, Path or None
+        Or the folder of one; None for the shipped surrogate.
+
+    Raises
+    ------
+    RaptorError
+        Where the mould cannot be read or holds no cell, a parameter is out of range, or the surrogate
+        cannot be read or is not calibrated.
+
+    Examples
+    --------
+    >>> prediction = predict("glial_1", CellParameters(0.5, 0.5, 0.3))
+    """
+    mould, cells = as_mould(mould), require_parameters(cells).require_sampled("prediction")
+    if not isinstance(surrogate, Surrogate):
+        surrogate = load_surrogate(surrogate)
+    return surrogate.examine(mould, cells)
+
+
+@cache
+def _shipped() -> Surrogate:
+    return load(SHIPPED)

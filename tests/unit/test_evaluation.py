@@ -158,9 +158,7 @@ def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
     assert regions.loc["all", "samples"] == 2
     below = int((metrics["delta"] < 0.3).sum())
     assert regions.loc["delta below 0.3", "samples"] == below
-    costs = costs_of(
-        surrogate, {"training": {"threads": 2}}, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]})
-    )
+    costs = costs_of(surrogate, {"threads": 2}, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]}))
     assert costs["training_core_minutes"] == pytest.approx(2.0)
     assert costs["all_ms"] > 0
 
@@ -217,7 +215,7 @@ def test_further_sets_are_held_out_castable_and_unlike(name, tmp_path):
 def test_baselines(stack):
     examples = augment(stack)
     table = read_table(stack)
-    nearest = Nearest(stack, examples)
+    nearest = Nearest.of(stack, examples)
     for sample in read_samples(stack, table.rows("train")):
         assert np.array_equal(nearest.fields(sample), sample.fields)
         turned = transform_sample(sample, Element(1, mirror=True))

@@ -12,7 +12,7 @@ from raptor.core.jobs import logged, progress
 from raptor.dataset.stack import read_table
 from raptor.moulds import moulds_by_id
 from raptor.surrogate.calibration import calibrate
-from raptor.surrogate.files import describe, load, save
+from raptor.surrogate.files import load, read_description, save
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
@@ -25,7 +25,7 @@ with logged(snakemake.log[0]):
         found = calibrate(
             surrogate, stack, moulds, snakemake.params.seed, lambda s: advance(f"simulation {s}")
         )
-    described = [describe(folder) for folder in folders]
+    described = [read_description(folder) for folder in folders]
     save(
         Path(snakemake.output.weights).parent,
         replace(surrogate, calibration=found),

@@ -10,7 +10,7 @@ from raptor.core.files import atomic_path
 from raptor.core.jobs import logged
 from raptor.studies.evaluation import compare
 from raptor.surrogate.costs import costs_of
-from raptor.surrogate.files import describe, load
+from raptor.surrogate.files import load, read_description
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
@@ -21,7 +21,9 @@ with logged(snakemake.log[0]):
     costs: dict[str, dict] = {name: {"model": name} for name in summaries}
     for weights, history in zip(snakemake.input.weights, snakemake.input.histories, strict=True):
         folder = Path(weights).parent
-        costs[folder.name] |= costs_of(load(folder), describe(folder), pd.read_csv(history))
+        costs[folder.name] |= costs_of(
+            load(folder), read_description(folder)["training"], pd.read_csv(history)
+        )
     with atomic_path(Path(snakemake.output.table)) as path:
         compare(summaries, costs.values()).to_csv(path, index=False)
     regions = {Path(file).parent.name: pd.read_csv(file) for file in snakemake.input.regions}

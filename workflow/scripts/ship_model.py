@@ -8,11 +8,11 @@ import pandas as pd
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged
 from raptor.report.model_card import model_card
-from raptor.surrogate.files import describe, load, save
+from raptor.surrogate.files import load, read_description, save
 
 with logged(snakemake.log[0]):
     source, target = Path(snakemake.input.weights).parent, Path(snakemake.output.weights).parent
-    surrogate, description = load(source), describe(source)
+    surrogate, description = load(source), read_description(source)
     save(
         target,
         surrogate,
@@ -24,7 +24,7 @@ with logged(snakemake.log[0]):
         snakemake.params.model,
         snakemake.params.name,
         surrogate,
-        description,
+        description["training"],
         pd.read_csv(snakemake.input.history),
         json.loads(Path(snakemake.input.summary).read_text())["test"],
         pd.read_csv(snakemake.input.regions),

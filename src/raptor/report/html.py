@@ -58,13 +58,14 @@ def write_report(path: Path, template: Path, folder: Path, files: Iterable[Path]
         temporary.write_text(text, encoding="utf-8")
 
 
-def render(template: str, content: Mapping[str, Any]) -> str:
+def render(template: str, content: Mapping[str, Any], *, escape: bool = True) -> str:
     """A rendered template; a name that `content` does not have is an error.
 
-    Filters: `number` and `percent` (both take digits), `section` of a Markdown text.
+    With `escape`, values are escaped for HTML. Filters: `number` and `percent` (both take digits), `section`
+    of a Markdown text.
     """
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=escape, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters |= {"number": number, "percent": percent, "section": section}
     versions = {"version": __version__, "model_version": MODEL_VERSION, "references": REFERENCES}

@@ -1,7 +1,7 @@
 """Predictions without a network, which every network has to beat."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,13 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.examples import Example, transform_sample
 from raptor.dataset.scaling import scale_inputs
 from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.resample import block_average
 from raptor.moulds.cast import CastMould
 from raptor.symmetry import Element
 
-COARSE = 16  # pixels of the images by which moulds are compared
+COARSE = 16
+"""Pixels of the images by which moulds are compared."""
+
 BASELINES = ("nearest", "mean")
 
 
@@ -36,33 +39,42 @@ def training_examples(stack: Path, examples: list[Example]) -> list[Example]:
     )
 
 
-@dataclass
+@dataclass(frozen=True)
 class Nearest:
     """Fields of the training example whose mould and parameters are nearest to what is asked for.
 
     The distance is Euclidean: of masks as images of `COARSE` pixels, over their mean distance in the
     training set, and of scaled parameters over theirs.
+
+    Parameters
+    ----------
+    stack : Path
+    examples : list of Example
+        Of the training split.
+    keys : ndarray (n, numbers)
+        What examples are compared by: coarse masks, then scaled parameters.
+    weights : ndarray (numbers,)
+        Of squared differences.
     """
 
     stack: Path
     examples: list[Example]
-    _keys: NDArray[np.float32] = field(init=False)
-    _weights: NDArray[np.float32] = field(init=False)
+    keys: NDArray[np.float32]
+    weights: NDArray[np.float32]
 
-    def __post_init__(self) -> None:
-        self.examples = training_examples(self.stack, self.examples)
-        keys = [
-            _key(transform_sample(sample, element)) for sample, element in _images(self.stack, self.examples)
-        ]
-        self._keys = np.stack(keys)
-        variance = self._keys.var(axis=0)
+    @classmethod
+    def of(cls, stack: Path, examples: list[Example]) -> "Nearest":
+        """The baseline of a stack's training examples."""
+        chosen = training_examples(stack, examples)
+        keys = np.stack([_key(transform_sample(*image)) for image in _images(stack, chosen)])
+        variance = keys.var(axis=0)
         images, parameters = variance[:-3].sum(), variance[-3:].sum()
         sizes = np.r_[np.full(len(variance) - 3, images), np.full(3, parameters)]
-        self._weights = (1 / (sizes + 1e-12)).astype(np.float32)
+        return cls(stack, chosen, keys, (1 / (sizes + 1e-12)).astype(np.float32))
 
     def fields(self, sample: Sample) -> NDArray[np.float32]:
         """Fields (8, y, x) of the nearest example."""
-        distance = (((self._keys - _key(sample)) ** 2) * self._weights).sum(axis=1)
+        distance = (((self.keys - _key(sample)) ** 2) * self.weights).sum(axis=1)
         example = self.examples[int(distance.argmin())]
         (found,) = read_samples(self.stack, [example.sample])
         return transform_sample(found, Element.from_index(example.element)).fields
@@ -77,7 +89,7 @@ def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sampl
         Where there is no such baseline.
     """
     if name == "nearest":
-        nearest = Nearest(stack, examples)
+        nearest = Nearest.of(stack, examples)
         return lambda sample, cast: nearest.fields(sample)
     if name == "mean":
         mean = training_mean(stack, examples)
@@ -99,6 +111,4 @@ def _images(stack: Path, examples: list[Example]) -> Iterator[tuple[Sample, Elem
 def _key(sample: Sample) -> NDArray[np.float32]:
     """What examples are compared by: coarse masks, then scaled parameters, flat."""
     inputs = scale_inputs(sample.depression, sample.tethers, sample.parameters)
-    step = inputs.shape[-1] // COARSE
-    squares = inputs[:2].reshape(2, COARSE, step, COARSE, step).mean(axis=(2, 4))
-    return np.concatenate([squares.ravel(), inputs[2:, 0, 0]]).astype(np.float32)
+    return np.concatenate([block_average(inputs[:2], COARSE).ravel(), inputs[2:, 0, 0]])

@@ -7,23 +7,18 @@ from statistics import median
 from typing import Any
 
 import pandas as pd
-import shapely
 
-from raptor.moulds.geometry import Circle, Mould
+from raptor.moulds.reading import read_mould
 from raptor.parameters import CellParameters
 from raptor.surrogate.inference import Surrogate
 
-MOULD = Mould(
-    shapely.box(-26.5, -13.25, 26.5, 13.25),
-    tuple(Circle(x, y, 1.5) for x in (-22.5, 22.5) for y in (-9.25, 9.25)),
-    "mirrors",
-)
+MOULD = "four_post_rectangle"
 PARAMETERS = CellParameters(0.5, 0.4, 0.2)
 REPEATS = 5
 
 
 def costs_of(
-    surrogate: Surrogate, description: Mapping[str, Any], history: pd.DataFrame
+    surrogate: Surrogate, training: Mapping[str, Any], history: pd.DataFrame
 ) -> dict[str, float | str | int]:
     """Weights, training and milliseconds of prediction, a model.
 
@@ -31,7 +26,6 @@ def costs_of(
     in physical units, on as many threads as torch has; medians of a few.
     """
     one = replace(surrogate, members=surrogate.members[:1])
-    training = description["training"]
     return {
         "network": surrogate.architecture.network,
         "pixels": surrogate.architecture.pixels,
@@ -46,8 +40,8 @@ def costs_of(
 
 
 def _milliseconds(surrogate: Surrogate, *, averaged: bool) -> float:
-    """Of one prediction of a rectangle with four posts."""
-    cast = surrogate.cast(MOULD)
+    """Of one prediction of `MOULD`."""
+    cast = surrogate.cast(read_mould(MOULD))
     times = []
     for _ in range(REPEATS + 1):  # the first also plans
         started = time.perf_counter()

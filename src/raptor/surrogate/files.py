@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
-from torch import Tensor
+from torch import Tensor, nn
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
@@ -39,9 +39,8 @@ def save(
         Write weights as float16, which takes half the room and changes predictions by less than 1e-3.
     """
     tensors = {
-        f"{number}.{name}": value.half() if half and value.dtype == torch.float32 else value
-        for number, member in enumerate(surrogate.members)
-        for name, value in member.state_dict().items()
+        name: value.half() if half and value.dtype == torch.float32 else value
+        for name, value in nn.ModuleList(surrogate.members).state_dict().items()
     }
     calibration = surrogate.calibration
     if calibration is not None:
@@ -64,7 +63,7 @@ def save(
         temporary.write_text(json.dumps(content, indent=1) + "\n")
 
 
-def describe(folder: Path) -> dict[str, Any]:
+def read_description(folder: Path) -> dict[str, Any]:
     """What model.json of a model's folder says.
 
     Raises
@@ -88,40 +87,35 @@ def load(folder: Path) -> Surrogate:
         Where a file is missing or cut short, or the weights do not fit the model.
     """
     folder = Path(folder)
-    content = describe(folder)
+    content = read_description(folder)
     try:
         architecture = Architecture.model_validate(content["architecture"])
         scaling = Scaling.from_json(content["normalisation"])
         layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "ensemble_size"))
     except (ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / MODEL} cannot be read: {error}") from error
-    members = tuple(Generator(architecture, scaling) for _ in range(count))
+    tensors, identity = _read_tensors(folder / WEIGHTS)
+    members = [Generator(architecture, scaling) for _ in range(count)]
     try:
-        with safe_open(folder / WEIGHTS, framework="pt") as file:
-            identity = (file.metadata() or {}).get("identity")
-        if identity != content.get("identity"):
+        if identity != content["identity"]:
             raise RuntimeError("they are of two trainings")
-        tensors = load_file(folder / WEIGHTS)
-        points = tensors.pop(DESCRIPTORS, None)
-        for number, member in enumerate(members):
-            member.load_state_dict(_of_member(tensors, number))
-        calibration = None
-        if content["calibration"] is not None:
-            if points is None:
-                raise RuntimeError("the training set's points are missing")
-            calibration = Calibration.from_json(content["calibration"], points.numpy())
-    except (OSError, SafetensorError) as error:
-        raise RaptorError(f"{folder / WEIGHTS} cannot be read: {error}") from error
+        described, calibration = content["calibration"], None
+        if described is not None:
+            calibration = Calibration.from_json(described, tensors.pop(DESCRIPTORS).numpy())
+        nn.ModuleList(members).load_state_dict(tensors)
     except (RuntimeError, KeyError, TypeError) as error:
         raise RaptorError(
             f"{folder / WEIGHTS} does not fit the model that model.json describes; "
             f"keep the two files of one training together ({str(error).splitlines()[0]})"
         ) from error
-    return Surrogate(members, architecture, scaling, layers, pixels, calibration)
+    return Surrogate(tuple(members), architecture, scaling, layers, pixels, calibration)
 
 
-def _of_member(tensors: Mapping[str, Tensor], number: int) -> dict[str, Tensor]:
-    """A member's part of a file's tensors, under the names that it knows, in float32."""
-    prefix = f"{number}."
-    part = {name.removeprefix(prefix): v for name, v in tensors.items() if name.startswith(prefix)}
-    return {name: v.float() if v.dtype == torch.float16 else v for name, v in part.items()}
+def _read_tensors(path: Path) -> tuple[dict[str, Tensor], str | None]:
+    """The tensors of a file of weights, and the identity of the training they are of."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            identity = (file.metadata() or {}).get("identity")
+        return load_file(path), identity
+    except (OSError, SafetensorError) as error:
+        raise RaptorError(f"{path} cannot be read: {error}") from error

@@ -73,14 +73,7 @@ def train(
         learner.generator.load_state_dict(initial_weights)
     history, best = _resume(learner, checkpoint, identity)
     for epoch in range(len(history), rules.epochs):
-        started = time.perf_counter()
-        row = {"epoch": epoch, **_train_epoch(learner, training, seed, epoch, place)}
-        row["validation_error"] = validation_error(learner.generator, validation, rules.batch_size, place)
-        row["seconds"] = time.perf_counter() - started
-        if not np.isfinite(list(row.values())).all():
-            raise RaptorError(
-                f"training broke down in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
-            )
+        row = _train_epoch(learner, training, validation, seed, epoch, place)
         if row["validation_error"] < min((r["validation_error"] for r in history), default=np.inf):
             best = {k: v.detach().cpu().clone() for k, v in learner.generator.state_dict().items()}
         history.append(row)
@@ -122,18 +115,31 @@ def _resume(
 
 
 def _train_epoch(
-    learner: Learner, examples: ExampleSet, seed: int, epoch: int, device: torch.device
+    learner: Learner,
+    training: ExampleSet,
+    validation: ExampleSet,
+    seed: int,
+    epoch: int,
+    device: torch.device,
 ) -> dict[str, float]:
-    """One pass over the examples in an order of the epoch's own; returns mean losses."""
+    """One pass over the examples in an order of the epoch's own; returns its row of the history."""
+    started = time.perf_counter()
     torch.manual_seed(int(np.random.SeedSequence([seed, epoch]).generate_state(1)[0]))
     size = learner.rules.batch_size
-    order = torch.randperm(len(examples)).tolist()
+    order = torch.randperm(len(training)).tolist()
     if len(order) % size == 1 and len(order) > 1:
         order.pop()  # a batch of one has no statistics to normalise by
     learner.start_epoch(epoch)
-    losses = [learner.step(*batch) for batch in examples.batches(order, size, device)]
+    losses = torch.stack([learner.step(*batch) for batch in training.batches(order, size, device)])
     # Read once an epoch: a GPU need not wait for the processor at every step.
-    return dict(zip(LOSSES, torch.stack(losses).mean(0).tolist(), strict=True))
+    row = {"epoch": epoch, **dict(zip(LOSSES, losses.mean(0).tolist(), strict=True))}
+    row["validation_error"] = validation_error(learner.generator, validation, size, device)
+    row["seconds"] = time.perf_counter() - started
+    if not np.isfinite(list(row.values())).all():
+        raise RaptorError(
+            f"training broke down in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
+        )
+    return row
 
 
 def validation_error(

@@ -1,4 +1,4 @@
-"""Models and predictions as files."""
+"""Trained models as files."""
 
 import json
 from collections.abc import Mapping

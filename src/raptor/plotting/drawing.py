@@ -133,6 +133,7 @@ def fields_figure(stacks: Mapping[str, NDArray[np.floating]], mould: Mould) -> F
     left, right = cast(Any, figure.subfigures(1, 2, width_ratios=[1, 5.2]))
     axes = left.add_subplot()
     draw_mould(axes, mould)
+    axes.spines[:].set_visible(False)
     axes.set_title(f"mould {mould.name}\n(image {IMAGE_SIZE:g} $l_0$ wide)")
     grid = right.subplots(2 * count, 4)
     for number, field in enumerate(FIELDS):

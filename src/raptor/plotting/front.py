@@ -12,11 +12,13 @@ from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import read_mould
 from raptor.moulds.summary import summarise
 from raptor.plotting.drawing import fields_figure, mould_figure
-from raptor.plotting.fits import fit_figure
+from raptor.plotting.fits import PARAMETER_LABELS, fit_figure
 from raptor.symmetry import FIELDS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+NUMBERS = PARAMETER_LABELS | {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
 
 
 def plot(what: Any) -> Figure:
@@ -53,6 +55,9 @@ def plot(what: Any) -> Figure:
 
 
 def draw_fields(fields: "xr.Dataset") -> Figure:
-    """The eight fields of one tissue beside its mould."""
+    """The eight fields of one tissue beside its mould, parameters and ratios."""
     stack = np.stack([fields[name].to_numpy() for name in FIELDS])
-    return fields_figure({str(fields.attrs.get("method", "")): stack}, mould_of(fields))
+    figure = fields_figure({str(fields.attrs.get("method", "")): stack}, mould_of(fields))
+    said = [f"{label} = {float(fields[name]):.3g}" for name, label in NUMBERS.items()]
+    figure.axes[0].set_xlabel("\n".join(said))
+    return figure

@@ -1,6 +1,5 @@
-"""Lint, format and types; and the sizes and layers of the house."""
+"""Lint, format and types; rules; what jobs wait for."""
 
-import ast
 import os
 import re
 import subprocess
@@ -48,29 +47,6 @@ def test_every_rule_is_complete():
             if "script:" in body:
                 for directive in ("output", "log", "benchmark", "threads", "resources"):
                     assert f"    {directive}:" in body, f"{name} has no {directive}"
-
-
-LAYERS = (
-    ("errors", "files", "compiled", "device", "jobs", "parameters", "symmetry"), ("moulds",),
-    ("condor", "morphology"),
-    ("fields", "fields_batch", "metrics", "orientation", "resolution"), ("dataset",),
-    ("surrogate", "baselines"),
-    ("fitting", "enrichment", "evaluation", "sweeps", "tradeoff", "configuration", "plotting"),
-    ("reference", "model_card", "measuring", "report"), ("cli", "benchmark"),
-)  # fmt: skip
-HEIGHT = {name: height for height, names in enumerate(LAYERS) for name in names}
-
-
-def test_imports_run_one_way():
-    package = ROOT / "src" / "raptor"
-    for path in package.rglob("*.py"):
-        layer = path.relative_to(package).parts[0].removesuffix(".py")
-        if layer == "__init__":
-            continue
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("raptor."):
-                used = node.module.split(".")[1]
-                assert HEIGHT[used] <= HEIGHT[layer], f"{path.name} of {layer} imports {used}"
 
 
 def test_a_simulation_job_leaves_heavy_imports_alone():

@@ -8,6 +8,7 @@ import torch
 from raptor.dataset.scaling import Scaling
 from raptor.fields.metrics import without_sign
 from raptor.fields.resample import block_average, deconvolve
+from raptor.frame import pixel_centres, pixel_size
 from raptor.moulds import Circle, Mould, mould_image
 from raptor.parameters import CellParameters
 from raptor.raster import rasterise
@@ -51,9 +52,9 @@ def random_fields(count=3, seed=0):
 
 def test_reach_is_five_sigma_and_covers_thin_posts():
     there = constraints.reachable(depression())[0, 0]
-    x = (torch.arange(PIXELS) + 0.5) * 62.5 / PIXELS - 31.25
+    x = torch.from_numpy(pixel_centres(PIXELS))
     row = there[PIXELS // 2]
-    assert float(x[row > 0].min()) == pytest.approx(-9 - constraints.DEEP, abs=62.5 / PIXELS)
+    assert float(x[row > 0].min()) == pytest.approx(-9 - constraints.DEEP, abs=pixel_size(PIXELS))
     assert (there >= depression()[0, 0]).all()
 
 
@@ -76,12 +77,12 @@ def test_any_fields_obey_it_after_projection_and_physical_ones_stay():
 def test_an_average_obeys_it_and_keeps_what_does_not_change():
     masks, cells = depression().expand(3, -1, -1, -1), torch.full((3,), float(CELLS))
     fields = constraints.project(random_fields(), masks, cells)
-    require_physical(constraints.signed(without_sign(fields).mean(0, keepdim=True)))
-    alike, top = constraints.signed(without_sign(fields[:1])), fields[0].abs().max()
+    require_physical(constraints.with_sign(without_sign(fields).mean(0, keepdim=True)))
+    alike, top = constraints.with_sign(without_sign(fields[:1])), fields[0].abs().max()
     assert (without_sign(alike) - without_sign(fields[:1])).abs().max() < 1e-3 * top
     flipped = fields[:1] * torch.tensor([1.0, 1, 1, 1, 1, 1, -1, -1])[:, None, None]
     both = without_sign(torch.cat([fields[:1], flipped])).mean(0, keepdim=True)
-    assert (constraints.signed(both) - alike).abs().max() < 1e-5 * top
+    assert (constraints.with_sign(both) - alike).abs().max() < 1e-5 * top
 
 
 @pytest.mark.parametrize("seen", [PIXELS, PIXELS // 2])

@@ -17,7 +17,7 @@ from raptor.dataset.run import simulate_shard
 from raptor.dataset.shards import write_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
 from raptor.fields.shape import shape_ratios
-from raptor.frame import pixel_centres
+from raptor.frame import pixel_centres, pixel_size
 from raptor.moulds import Mould, moulds_by_id
 from raptor.moulds.cast import CastMould
 from raptor.raster import density_threshold
@@ -90,7 +90,7 @@ def test_descriptors_do_not_change_with_the_view_and_tell_a_bar_from_posts(stack
     barred = descriptors(sample.depression, tethers, sample.parameters)
     named = dict(zip(DESCRIPTORS, barred, strict=True))
     assert named["tethers"] == 1
-    assert named["longest_tether"] > 24 * 62.5 / 32
+    assert named["longest_tether"] > 24 * pixel_size(32)
 
 
 def test_a_point_of_the_training_set_is_near_it_and_another_is_not():

@@ -112,7 +112,7 @@ def _positive(tensor: Tensor, trace: Tensor) -> Tensor:
     return mended.to(tensor.dtype)
 
 
-def signed(fields: Tensor) -> Tensor:
+def with_sign(fields: Tensor) -> Tensor:
     """Means (n, 8, y, x) of predictions with signs: sxsz positive, sysz with the sign of sxsy.
 
     Both are shortened where the tensor would not stay positive: what obeys the physics before it was

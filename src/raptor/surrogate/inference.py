@@ -20,7 +20,7 @@ from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Calibration
-from raptor.surrogate.constraints import project, signed
+from raptor.surrogate.constraints import project, with_sign
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.out_of_distribution import descriptors
 from raptor.surrogate.prediction import Prediction
@@ -205,7 +205,7 @@ class Surrogate:
 
     def _finish(self, means: Tensor, cast: CastMould) -> NDArray[np.float32]:
         """Fields (n, 8, y, x) of the whole raster, obeying the physics, from means (n, 8, y', x')."""
-        fields = signed(deconvolve(means, self.pixels))
+        fields = with_sign(deconvolve(means, self.pixels))
         if self.members[0].physical is None or self.architecture.pixels != self.pixels:
             depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
             fields = project(fields, depression, torch.tensor([float(cast.n_cells)]))
@@ -215,7 +215,7 @@ class Surrogate:
 def _mean(answers: Tensor) -> Tensor:
     """Means (n, 8, y, x) over answers (n, answers, 8, y, x), of magnitudes where the sign is spontaneous.
 
-    D4 moves magnitudes like any image; `constraints.signed` gives signs back.
+    D4 moves magnitudes like any image; `constraints.with_sign` gives signs back.
     """
     return without_sign(answers).mean(1)
 

@@ -127,11 +127,11 @@ class Prediction:
         for name in ("disagreement", "distance"):
             text = f"{name}, over what is usual; above 1 trust nothing"
             added[name] = ((), getattr(self, name), named(text))
-        spread = {
+        deviations = {
             f"{name}_std": (("y", "x"), image, named(f"standard deviation of the error of {name}, per pixel"))
             for name, image in zip(fields, self.deviation, strict=True)
         }
-        return fields.assign_coords(added).assign(spread)
+        return fields.assign_coords(added).assign(deviations)
 
     def __str__(self) -> str:
         half = self.ratio_bands.half[-1]

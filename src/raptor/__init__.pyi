@@ -5,6 +5,8 @@ from .core.version import MODEL_VERSION, __version__
 from .dataset.result import load_fields, save
 from .fitting.command import fit
 from .fitting.fitted import FittedTissue
+from .imaging.command import measure
+from .imaging.report import MeasuredPhotograph
 from .moulds.geometry import Circle, Mould
 from .moulds.library.tissues import MeasuredTissue, tissue
 from .moulds.reading import read_mould
@@ -19,6 +21,7 @@ __all__ = [
     "CellParameters",
     "Circle",
     "FittedTissue",
+    "MeasuredPhotograph",
     "MeasuredTissue",
     "Mould",
     "NetworkModel",
@@ -30,6 +33,7 @@ __all__ = [
     "fit",
     "load_fields",
     "load_surrogate",
+    "measure",
     "plot",
     "predict",
     "read_mould",

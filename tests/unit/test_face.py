@@ -178,6 +178,15 @@ def test_a_fit_finds_parameters_and_says_what_is_left_open(tissue, mould):
     assert raptor.plot(found).axes[0].get_title() == "simulator"
 
 
+def test_a_fit_takes_an_outline_in_l0(mould):
+    tissue = mould.outline.buffer(-1)
+    start = raptor.CellParameters(0.2, 0.5, 0.3)
+    options = {"by": "simulator", "start": start, "layers": 1, "accuracy": "draft", "simulations": 2}
+    found = raptor.fit(mould, outline=tissue, **options)
+    assert 0 < found.distance < 2
+    assert found.numbers["distance"] == found.distance
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

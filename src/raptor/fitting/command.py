@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from raptor.condor.simulate import PIXELS
@@ -98,7 +99,7 @@ def fit(
     area_ratio: float | None = None,
     width_ratio: float | None = None,
     *,
-    outline: Outline | str | Path | None = None,
+    outline: Outline | shapely.Geometry | str | Path | None = None,
     by: By = "surrogate",
     surrogate: Surrogate | str | Path | None = None,
     start: CellParameters | None = None,
@@ -120,8 +121,9 @@ def fit(
         A mould, or what `read_mould` reads: a name of the library, or a file.
     area_ratio, width_ratio : float, optional
         Measured A/A0 and w/w0, one or both.
-    outline : Outline, str or Path, optional
-        The tissue's outline, in place of ratios: a picture of it, cropped to the frame of 62.5 l0.
+    outline : shapely Polygon or MultiPolygon, str or Path, optional
+        The tissue's outline (l0), such as `measure` finds it, in place of ratios; or a picture of it, cropped
+        to the frame of 62.5 l0.
     by : str
         "surrogate", or "simulator": from the surrogate's fit on by simulations.
     surrogate : Surrogate, str, Path or None
@@ -172,7 +174,9 @@ def fit(
 
 
 def _target(
-    area_ratio: float | None, width_ratio: float | None, outline: Outline | str | Path | None
+    area_ratio: float | None,
+    width_ratio: float | None,
+    outline: Outline | shapely.Geometry | str | Path | None,
 ) -> Target | Outline:
     """What was measured: ratios, or an outline."""
     ratios = {"area ratio": area_ratio, "width ratio": width_ratio}
@@ -188,6 +192,8 @@ def _target(
             )
     if outline is None:
         return Target(area_ratio, width_ratio)
+    if isinstance(outline, shapely.Geometry):
+        return Outline.along(outline)
     return outline if isinstance(outline, Outline) else read_outline(Path(outline))
 
 

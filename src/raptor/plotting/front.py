@@ -22,11 +22,11 @@ NUMBERS = PARAMETER_LABELS | {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
 
 
 def plot(what: Any) -> Figure:
-    """Draw a mould, a simulated or a predicted tissue, its fields, or a fit.
+    """Draw a mould, a simulated or a predicted tissue, its fields, a fit, or a measured photograph.
 
     Parameters
     ----------
-    what : Mould, Tissue, Prediction, FittedTissue, xarray.Dataset of fields, str or Path
+    what : Mould, Tissue, Prediction, Dataset of fields, FittedTissue, MeasuredPhotograph, str or Path
         A string or a path is a mould: a name of the library or a file.
 
     Returns
@@ -45,6 +45,10 @@ def plot(what: Any) -> Figure:
         return mould_figure(what, summarise(what).rows)
     if hasattr(what, "density") and hasattr(what, "by"):
         return fit_figure(what.mould, {what.by: what.density}, {what.by: what.threshold}, what.rows)
+    if hasattr(what, "picture"):
+        from raptor.plotting.overlay import overlay_figure
+
+        return overlay_figure(what.picture, what.mould, what.measurement)
     if hasattr(what, "to_dataset"):
         what = what.to_dataset()
     if hasattr(what, "data_vars"):

@@ -1,15 +1,11 @@
 """A picture to check a measurement by eye."""
 
-from pathlib import Path
-
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
 from raptor.imaging.pictures import Picture
 from raptor.imaging.registration import Registration
 from raptor.imaging.tissue import Measurement
@@ -48,21 +44,6 @@ def overlay_figure(picture: Picture, mould: Mould, measurement: Measurement) -> 
     )
     _draw_histogram(histogram, measurement)
     return figure
-
-
-def write_overlay(path: Path, picture: Picture, mould: Mould, measurement: Measurement) -> None:
-    """Write the overlay as PNG.
-
-    Raises
-    ------
-    RaptorError
-        Where the path has another ending or cannot be written.
-    """
-    if path.suffix.lower() != ".png":
-        raise RaptorError(f"overlay {path} must end in .png")
-    figure = overlay_figure(picture, mould, measurement)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=110, metadata={"Software": None})
 
 
 def _draw_histogram(axes: Axes, measurement: Measurement) -> None:

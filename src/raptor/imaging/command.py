@@ -1,0 +1,58 @@
+"""A measurement as a user asks for it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from raptor import imaging
+from raptor.imaging.report import MeasuredPhotograph
+from raptor.moulds.geometry import Mould
+from raptor.moulds.reading import as_mould
+
+
+def measure(
+    photograph: str | Path | NDArray[Any],
+    mould: Mould | str | Path,
+    *,
+    look: str = "auto",
+    threshold: float | None = None,
+    landmarks: Sequence[str] = (),
+    aligned: bool = False,
+    mirrored: bool = False,
+) -> MeasuredPhotograph:
+    """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask of its mould.
+
+    Look at `raptor.plot` of what it returns: nothing else shows a wrong edge.
+
+    Parameters
+    ----------
+    photograph : str, Path or ndarray
+        PNG, TIFF or JPEG file, or grey values (row, column).
+    mould : Mould, str or Path
+        A mould, or what `read_mould` reads: a name of the library, or a file.
+    look : str
+        "bright", "dark" or "auto": the tissue against the floor.
+    threshold : float, optional
+        Brightness between floor and tissue, relative to the plate; Otsu's where not given.
+    landmarks : sequence of str
+        Two or more of "column,row=x,y" or "column,row=tether 1", in place of the rim.
+    aligned : bool
+        Whether the image is the frame, 62.5 l0 wide.
+    mirrored : bool
+        Whether it was taken from below or in a mirror.
+
+    Raises
+    ------
+    RaptorError
+        Where the photograph or the mould cannot be read, or the tissue cannot be found.
+    """
+    appearance, mould = imaging.appearance_named(look), as_mould(mould)
+    if isinstance(photograph, (str, Path)):
+        picture = imaging.read_picture(Path(photograph))
+    else:
+        picture = imaging.as_picture(photograph, "the photograph")
+    registration = imaging.register(picture, mould, landmarks, aligned, mirrored)
+    found = imaging.measure(picture, mould, registration, appearance, threshold)
+    return MeasuredPhotograph(picture, mould, found)

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from raptor.condor.energy import SMALLEST_LEVER, SOFTENING, unit_orientations
+from raptor.condor.energy import SMALLEST_LEVER, SOFTENING, natural_length, unit_orientations
 from raptor.condor.network import Network
-from raptor.condor.simd import lanes, load, positive, sqrt, store, where
+from raptor.condor.simd import dot, lanes, load, muladd, positive, sqrt, store, where
 from raptor.condor.walls import Walls, wall_energy_kernel
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
@@ -88,19 +88,19 @@ def _propose_kernel(old, random, step, turn):
     length = turn * load(random, 5 * width)
     flat = length * sqrt(1.0 - upright * upright)
     a, b, c = a + flat * cosine, b + flat * sine, c + length * upright
-    inverse = 1.0 / sqrt(a * a + b * b + c * c)
+    inverse = 1.0 / sqrt(dot(a, a, b, b, c, c))
     return x, y, z, a * inverse, b * inverse, c * inverse
 
 
 @kernel
 def _stretch_kernel(lx, ly, lz, a, b, c, ua, ub, uc, rest, delta):
     """|l| - L' of bonds, given displacements and the orientations of both ends."""
-    squared = lx * lx + ly * ly + lz * lz + SOFTENING
+    squared = dot(lx, lx, ly, ly, lz, lz) + SOFTENING
     inverse = 1.0 / sqrt(squared)
-    first = (lx * a + ly * b + lz * c) * inverse
-    second = (lx * ua + ly * ub + lz * uc) * inverse
-    squares = first * first + second * second
-    return squared * inverse - (rest - rest * delta) - 0.5 * rest * delta * squares
+    first = dot(lx, a, ly, b, lz, c) * inverse
+    second = dot(lx, ua, ly, ub, lz, uc) * inverse
+    squares = muladd(first, first, second * second)
+    return squared * inverse - natural_length(rest, delta, squares)
 
 
 @kernel
@@ -118,7 +118,7 @@ def _difference_kernel(state, n, room, network, chunk, old, new, delta):
         rest = network.rest_length[kind]
         before = _stretch_kernel(px - x, py - y, pz - z, a, b, c, ua, ub, uc, rest, delta)
         after = _stretch_kernel(px - nx, py - ny, pz - nz, na, nb, nc, ua, ub, uc, rest, delta)
-        difference = difference + stiffness * (after - before) * (after + before)
+        difference = muladd(stiffness * (after - before), after + before, difference)
     return 0.5 * difference
 
 

@@ -76,7 +76,8 @@ def steps_to(delta: float, shortening: float) -> NDArray[np.float64]:
         return np.array([delta])
     count = math.ceil(math.log(1 - delta) / math.log(1 - shortening) - 1e-9)
     count = max(count, FEWEST_STEPS)
-    return np.append(1 - (1 - delta) ** (np.arange(1, count) / count), delta)
+    # One number at a time: NumPy's powers of an array differ in the last bit from processor to processor.
+    return np.array([*(1 - (1 - delta) ** (step / count) for step in range(1, count)), delta])
 
 
 def contract(

@@ -17,11 +17,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import DTypeLike, NDArray
 
 from raptor.condor.lattice import Lattice
 from raptor.condor.network import Network
-from raptor.condor.simd import lanes, load, positive, sqrt, store, total, where
+from raptor.condor.simd import dot, lanes, load, muladd, positive, sqrt, store, total, where
 from raptor.condor.walls import Walls, near_kernel, wall_energy_kernel
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
@@ -31,12 +32,13 @@ CONTACT_LENGTH = 0.01  # of a bond's rest length
 SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
 
 
+@register_jitable
 def natural_length(rest_length, delta, squares):
-    """L': length at which a bond is at rest, given (u.s_i)^2 + (u.s_j)^2 (paper, equation 2), l0."""
-    return rest_length * (1 - delta / 2 * (2 - squares))
+    """L' = L (1 - Delta/2 (2 - squares)): length at which a bond is at rest (paper, equation 2), l0.
 
-
-natural_length_kernel = kernel(natural_length)
+    `squares` is (u.s_i)^2 + (u.s_j)^2. Numbers, lanes of them, arrays and tensors alike.
+    """
+    return muladd(0.5 * rest_length * delta, squares, rest_length * (1 - delta))
 
 
 class Scratch(NamedTuple):
@@ -72,42 +74,41 @@ def _bonds_kernel(cells, network, delta, contact, work):
             j = network.second[entry] + room
             kind = network.kind[entry]
             stiffness = where(network.bits[entry], network.stiffness[kind], x)
-            half = 0.5 * delta * network.rest_length[kind]
+            rest_length = network.rest_length[kind]
             lx, ly, lz = load(unit, j) - x, load(unit, j + n) - y, load(unit, j + 2 * n) - z
             bx, by, bz = load(unit, j + 3 * n), load(unit, j + 4 * n), load(unit, j + 5 * n)
-            squared = lx * lx + ly * ly + lz * lz + SOFTENING
+            squared = dot(lx, lx, ly, ly, lz, lz) + SOFTENING
             inverse = 1.0 / sqrt(squared)
             ux, uy, uz = lx * inverse, ly * inverse, lz * inverse
-            first = ux * ax + uy * ay + uz * az
-            second = ux * bx + uy * by + uz * bz
-            squares = first * first + second * second
-            stretch = squared * inverse - (network.rest_length[kind] - 2.0 * half) - half * squares
+            first, second = dot(ux, ax, uy, ay, uz, az), dot(ux, bx, uy, by, uz, bz)
+            squares = muladd(first, first, second * second)
+            stretch = squared * inverse - natural_length(rest_length, delta, squares)
             tension = stiffness * stretch
-            double = double + tension * stretch
-            # dL'/du = 2 half (first s_i + second s_j), and du/dl = (1 - u u^T) / |l|.
-            twist = -2.0 * half * tension
+            double = muladd(tension, stretch, double)
+            # dL'/du = L Delta (first s_i + second s_j), and du/dl = (1 - u u^T) / |l|.
+            twist = -delta * rest_length * tension
             turn = twist * inverse
             along = tension - turn * squares
             by_first, by_second = turn * first, turn * second
-            px = along * ux + by_first * ax + by_second * bx
-            py = along * uy + by_first * ay + by_second * by
-            pz = along * uz + by_first * az + by_second * bz
+            px = dot(along, ux, by_first, ax, by_second, bx)
+            py = dot(along, uy, by_first, ay, by_second, by)
+            pz = dot(along, uz, by_first, az, by_second, bz)
             if contact > 0.0:
                 dx, dy, dz = network.direction[kind]
-                ahead = lx * dx + ly * dy + lz * dz
-                push = positive(CONTACT_LENGTH * network.rest_length[kind] - ahead)
+                ahead = dot(lx, dx, ly, dy, lz, dz)
+                push = positive(CONTACT_LENGTH * rest_length - ahead)
                 push = push * where(network.bits[entry], contact, x)
-                close = close + push * push
+                close = muladd(push, push, close)
                 px, py, pz = px - push * dx, py - push * dy, pz - push * dz
             fx, fy, fz = fx + px, fy + py, fz + pz
             first, second = first * twist, second * twist
-            tx, ty, tz = tx + first * ux, ty + first * uy, tz + first * uz
+            tx, ty, tz = muladd(first, ux, tx), muladd(first, uy, ty), muladd(first, uz, tz)
             store(force, j, load(force, j) - px)
             store(force, j + n, load(force, j + n) - py)
             store(force, j + 2 * n, load(force, j + 2 * n) - pz)
-            store(force, j + 3 * n, load(force, j + 3 * n) + second * ux)
-            store(force, j + 4 * n, load(force, j + 4 * n) + second * uy)
-            store(force, j + 5 * n, load(force, j + 5 * n) + second * uz)
+            store(force, j + 3 * n, muladd(second, ux, load(force, j + 3 * n)))
+            store(force, j + 4 * n, muladd(second, uy, load(force, j + 4 * n)))
+            store(force, j + 5 * n, muladd(second, uz, load(force, j + 5 * n)))
         store(force, i, load(force, i) + fx)
         store(force, i + n, load(force, i + n) + fy)
         store(force, i + 2 * n, load(force, i + 2 * n) + fz)
@@ -180,7 +181,7 @@ def _tension_kernel(state, first, second, stiffness, rest, delta, hooke, tension
             along_first += u * state[(c + 3) * cells + i]
             along_second += u * state[(c + 3) * cells + j]
         squares = along_first * along_first + along_second * along_second
-        natural = natural_length_kernel(rest[bond], delta, squares)
+        natural = natural_length(rest[bond], delta, squares)
         value = stiffness[bond] * (length - natural if hooke else natural)
         tension[i] += value
         tension[j] += value

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from raptor.condor.energy import SMALLEST_LEVER, Scratch, _objective_kernel, scratch, unit_orientations
 from raptor.condor.network import Network
+from raptor.condor.simd import DOUBLES, doubles, larger, largest, load_double, magnitude, muladd, total
 from raptor.condor.walls import Walls
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
@@ -70,25 +71,54 @@ class _Work(NamedTuple):
 
 @kernel
 def _dot(a, b):
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total
+    whole = a.size - a.size % DOUBLES
+    lanes = doubles(0.0)
+    for i in range(0, whole, DOUBLES):
+        lanes = muladd(load_double(a, i), load_double(b, i), lanes)
+    product = total(lanes)
+    for i in range(whole, a.size):
+        product += a[i] * b[i]
+    return product
 
 
 @kernel
 def _largest(a):
-    value = a[0] * 0
-    for i in range(a.size):
-        value = max(value, abs(a[i]))
+    whole = a.size - a.size % DOUBLES
+    lanes = doubles(0.0)
+    for i in range(0, whole, DOUBLES):
+        lanes = larger(lanes, magnitude(load_double(a, i)))
+    value = largest(lanes)
+    for i in range(whole, a.size):
+        value = max(value, float(abs(a[i])))
     return value
+
+
+@kernel
+def _products_kernel(sp, yp, s, y, g):
+    """s_p.g, y_p.g, s_p.y, y_p.s and y_p.y of arrays of equal size."""
+    whole = g.size - g.size % DOUBLES
+    zero = doubles(0.0)
+    sg, yg, sy, ys, yy = zero, zero, zero, zero, zero
+    for i in range(0, whole, DOUBLES):
+        a, b = load_double(sp, i), load_double(yp, i)
+        c, d, e = load_double(s, i), load_double(y, i), load_double(g, i)
+        sg, yg = muladd(a, e, sg), muladd(b, e, yg)
+        sy, ys, yy = muladd(a, d, sy), muladd(b, c, ys), muladd(b, d, yy)
+    sums = total(sg), total(yg), total(sy), total(ys), total(yy)
+    for i in range(whole, g.size):
+        a, b = float(sp[i]), float(yp[i])
+        more = a * g[i], b * g[i], a * y[i], b * s[i], b * y[i]
+        sums = (
+            sums[0] + more[0], sums[1] + more[1], sums[2] + more[2], sums[3] + more[3], sums[4] + more[4]
+        )  # fmt: skip
+    return sums
 
 
 @kernel
 def _residual_gradient_kernel(state, gradient, lever):
     """Largest component of the gradient, that by orientations as for vectors of the lever's length."""
     n = state.size // 6
-    residual = float(_largest(gradient[: 3 * n]))
+    residual = _largest(gradient[: 3 * n])
     for i in range(3 * n, 4 * n):
         a, b, c = state[i], state[i + n], state[i + 2 * n]
         length = math.sqrt(a * a + b * b + c * c)
@@ -127,13 +157,7 @@ def _remember_kernel(state, work, slot, written):
             g[i] = new_g[i]
         for p in range(written):
             sp, yp = work.steps[p, start:end], work.changes[p, start:end]
-            sg = yg = sy = ys = yy = 0.0
-            for i in range(end - start):
-                sg += sp[i] * g[i]
-                yg += yp[i] * g[i]
-                sy += sp[i] * y[i]
-                ys += yp[i] * s[i]
-                yy += yp[i] * y[i]
+            sg, yg, sy, ys, yy = _products_kernel(sp, yp, s, y, g)
             work.sg[p] += sg
             work.yg[p] += yg
             work.sy[p, slot] += sy
@@ -202,7 +226,7 @@ def _direction_kernel(work):
 
 
 @kernel
-def _search_kernel(state, total, slope, length, network, walls, delta, contact, work):
+def _search_kernel(state, before, slope, length, network, walls, delta, contact, work):
     """Shorten a step until the objective falls enough; returns the step and the new energies."""
     used = 0
     energy = wall_energy = 0.0
@@ -220,10 +244,10 @@ def _search_kernel(state, total, slope, length, network, walls, delta, contact, 
         )
         used += 1
         value = energy + wall_energy
-        if value <= total + SUFFICIENT * length * slope:
+        if value <= before + SUFFICIENT * length * slope:
             return length, energy, wall_energy, used
         # The minimum of the parabola through what is known, within bounds.
-        best = -0.5 * slope * length * length / (value - total - slope * length)
+        best = -0.5 * slope * length * length / (value - before - slope * length)
         length = max(0.1 * length, min(0.5 * length, best))
     return 0.0, energy, wall_energy, used
 

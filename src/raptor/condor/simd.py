@@ -16,7 +16,13 @@ from numba.extending import intrinsic, models, overload, register_model
 from numpy.typing import DTypeLike, NDArray
 
 REGISTER = 64
-"""Bytes of a 512-bit register; narrower machines take two or four instructions for one."""
+"""Bytes of a 512-bit register; narrower machines take two or four instructions for one.
+
+The same on every processor, so that every sum is taken in the same order and has the same bits.
+"""
+
+DOUBLES = REGISTER // 8
+"""Numbers of float64 in a register."""
 
 
 def lanes(precision: DTypeLike) -> int:
@@ -29,6 +35,16 @@ def load(array: NDArray[Any], i: int) -> Any:
     return array[i : i + lanes(array.dtype)].copy()
 
 
+def load_double(array: NDArray[Any], i: int) -> Any:
+    """The `DOUBLES` numbers from array[i] on, of any precision, as lanes of float64."""
+    return array[i : i + DOUBLES].astype(np.float64)
+
+
+def doubles(number: float) -> Any:
+    """Lanes of float64 that all hold one number."""
+    return np.full(DOUBLES, number)
+
+
 def store(array: NDArray[Any], i: int, value: Any) -> None:
     """array[i + t] = value[t] for each lane t."""
     array[i : i + lanes(array.dtype)] = value
@@ -39,9 +55,34 @@ def sqrt(value: Any) -> Any:
     return np.sqrt(value)
 
 
+def muladd(a: Any, b: Any, c: Any) -> Any:
+    """The sum a b + c of numbers, or of lanes with one rounding where the processor can."""
+    return a * b + c
+
+
+def dot(a: Any, x: Any, b: Any, y: Any, c: Any, z: Any) -> Any:
+    """Lanes of a x + b y + c z."""
+    return muladd(a, x, muladd(b, y, c * z))
+
+
 def total(value: Any) -> float:
     """Sum of all lanes, float64."""
     return float(np.sum(value, dtype=np.float64))
+
+
+def magnitude(value: Any) -> Any:
+    """Absolute value of each lane."""
+    return np.abs(value)
+
+
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two numbers in each lane; the other one where one is NaN."""
+    return np.fmax(a, b)
+
+
+def largest(value: Any) -> float:
+    """Largest of all lanes, NaN left out, float64."""
+    return float(np.nanmax(value))
 
 
 def where(bits: int, number: float, like: Any) -> Any:
@@ -83,25 +124,56 @@ def _spread(context, builder, value, kind, lanes_kind):
     return builder.shuffle_vector(one, one, everywhere)
 
 
-def _pointer(context, builder, kind, array, index):
+def _pointer(context, builder, kind, array, index, count):
     data = context.make_array(kind)(context, builder, array).data
-    vector = context.get_value_type(_LanesType(kind.dtype))
+    vector = ir.VectorType(context.get_value_type(kind.dtype), count)
     return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+
+
+def _called(builder, name, kind, result, arguments):
+    """One of LLVM's functions of lanes."""
+    function = ir.FunctionType(result, [argument.type for argument in arguments])
+    name = f"llvm.{name}.v{kind.count}f{kind.scalar.bitwidth}"
+    return builder.call(cgutils.get_or_insert_function(builder.module, function, name), arguments)
 
 
 @intrinsic
 def _load(typing, array, i):
+    kind = _LanesType(array.dtype)
+
     def generate(context, builder, signature, arguments):
-        place = _pointer(context, builder, array, *arguments)
+        place = _pointer(context, builder, array, *arguments, kind.count)
         return builder.load(place, align=array.dtype.bitwidth // 8)
 
-    return _LanesType(array.dtype)(array, i), generate
+    return kind(array, i), generate
+
+
+@intrinsic
+def _load_double(typing, array, i):
+    kind = _LanesType(types.float64)
+
+    def generate(context, builder, signature, arguments):
+        place = _pointer(context, builder, array, *arguments, kind.count)
+        value = builder.load(place, align=array.dtype.bitwidth // 8)
+        return value if array.dtype == types.float64 else builder.fpext(value, context.get_value_type(kind))
+
+    return kind(array, i), generate
+
+
+@intrinsic
+def _doubles(typing, number):
+    kind = _LanesType(types.float64)
+
+    def generate(context, builder, signature, arguments):
+        return _spread(context, builder, arguments[0], number, kind)
+
+    return kind(number), generate
 
 
 @intrinsic
 def _store(typing, array, i, value):
     def generate(context, builder, signature, arguments):
-        place = _pointer(context, builder, array, *arguments[:2])
+        place = _pointer(context, builder, array, *arguments[:2], value.count)
         builder.store(arguments[2], place, align=array.dtype.bitwidth // 8)
         return context.get_dummy_value()
 
@@ -111,22 +183,55 @@ def _store(typing, array, i, value):
 @intrinsic
 def _sqrt(typing, value):
     def generate(context, builder, signature, arguments):
-        vector = arguments[0].type
-        name = f"llvm.sqrt.v{value.count}f{value.scalar.bitwidth}"
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
-        return builder.call(function, arguments)
+        return _called(builder, "sqrt", value, arguments[0].type, arguments)
 
     return value(value), generate
+
+
+@intrinsic
+def _muladd(typing, a, b, c):
+    kind = next(kind for kind in (a, b, c) if isinstance(kind, _LanesType))
+
+    def generate(context, builder, signature, arguments):
+        operands = zip(arguments, signature.args, strict=True)
+        vectors = [_spread(context, builder, value, type_, kind) for value, type_ in operands]
+        return _called(builder, "fmuladd", kind, vectors[0].type, vectors)
+
+    return kind(a, b, c), generate
+
+
+@intrinsic
+def _magnitude(typing, value):
+    def generate(context, builder, signature, arguments):
+        return _called(builder, "fabs", value, arguments[0].type, arguments)
+
+    return value(value), generate
+
+
+@intrinsic
+def _larger(typing, a, b):
+    def generate(context, builder, signature, arguments):
+        return _called(builder, "maxnum", a, arguments[0].type, arguments)
+
+    return a(a, b), generate
+
+
+@intrinsic
+def _largest(typing, value):
+    def generate(context, builder, signature, arguments):
+        number = context.get_value_type(value.scalar)
+        found = _called(builder, "vector.reduce.fmax", value, number, arguments)
+        return context.cast(builder, found, value.scalar, types.float64)
+
+    return types.float64(value), generate
 
 
 @intrinsic
 def _total(typing, value):
     def generate(context, builder, signature, arguments):
         number = context.get_value_type(value.scalar)
-        name = f"llvm.vector.reduce.fadd.v{value.count}f{value.scalar.bitwidth}"
-        kind = ir.FunctionType(number, [number, arguments[0].type])
-        function = cgutils.get_or_insert_function(builder.module, kind, name)
-        found = builder.call(function, [ir.Constant(number, 0.0), arguments[0]])
+        summands = [ir.Constant(number, 0.0), *arguments]
+        found = _called(builder, "vector.reduce.fadd", value, number, summands)
         return context.cast(builder, found, value.scalar, types.float64)
 
     return types.float64(value), generate
@@ -160,6 +265,16 @@ def _compiled_load(array, i):
     return lambda array, i: _load(array, np.intp(i))
 
 
+@overload(load_double)
+def _compiled_load_double(array, i):
+    return lambda array, i: _load_double(array, np.intp(i))
+
+
+@overload(doubles)
+def _compiled_doubles(number):
+    return lambda number: _doubles(number)
+
+
 @overload(store)
 def _compiled_store(array, i, value):
     return lambda array, i, value: _store(array, np.intp(i), value)
@@ -170,6 +285,18 @@ def _compiled_sqrt(value):
     return lambda value: _sqrt(value)
 
 
+@overload(muladd)
+def _compiled_muladd(a, b, c):
+    if any(isinstance(kind, _LanesType) for kind in (a, b, c)):
+        return lambda a, b, c: _muladd(a, b, c)
+    return lambda a, b, c: a * b + c
+
+
+@overload(dot)
+def _compiled_dot(a, x, b, y, c, z):
+    return lambda a, x, b, y, c, z: _muladd(a, x, _muladd(b, y, c * z))
+
+
 @overload(total)
 def _compiled_total(value):
     return lambda value: _total(value)
@@ -178,6 +305,21 @@ def _compiled_total(value):
 @overload(positive)
 def _compiled_positive(value):
     return lambda value: _positive(value)
+
+
+@overload(magnitude)
+def _compiled_magnitude(value):
+    return lambda value: _magnitude(value)
+
+
+@overload(larger)
+def _compiled_larger(a, b):
+    return lambda a, b: _larger(a, b)
+
+
+@overload(largest)
+def _compiled_largest(value):
+    return lambda value: _largest(value)
 
 
 @overload(where)

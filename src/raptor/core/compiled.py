@@ -1,15 +1,24 @@
-"""How kernels are compiled: the one place for Numba's flags and cache."""
+"""How kernels are compiled: the one place for Numba's flags and cache.
 
+Arithmetic is strict: no flag lets the compiler reorder a sum or fuse a product. Each compiled kernel
+carries copies of the kernels that it calls, compiled once more in their new surroundings, and of copies
+of one name a process runs the one that it met first. Strict copies give the same bits; under fast-math
+flags they did not, and a result hung on what had been compiled, loaded or called before.
+"""
+
+import fcntl
 import hashlib
+import logging
 import os
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
-
-# contract, arcp and reassoc let loops use vector units; NaN and infinity keep their meaning.
-FAST_MATH = {"contract", "reassoc", "nsz", "arcp"}
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 
 
 def source_hash() -> str:
@@ -20,16 +29,83 @@ def source_hash() -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
-# Numba's cache does not see an edited helper in another file and would run the stale one; a folder
-# named by the hash of all kernel sources cannot be stale.
-if "NUMBA_CACHE_DIR" not in os.environ:
-    _base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    numba.config.CACHE_DIR = str(_base / "raptor" / "kernels" / source_hash())  # type: ignore[attr-defined]
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: NUMBA_CACHE_DIR, XDG_CACHE_HOME or ~/.cache, by `source_hash`.
+
+    Numba does not see an edited helper in another file and would run the stale one; a folder named by
+    the hash of all kernel sources cannot be stale. Numba tells processors apart within it.
+    """
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen) / source_hash()
+    try:
+        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:  # a user without a home
+        caches = Path(os.devnull)
+    return caches / "raptor" / "kernels" / source_hash()
+
+
+CACHE_FOLDER = cache_folder()
+
+
+class _Locator(UserProvidedCacheLocator):
+    """The one folder, also where it can only be read or cannot be made."""
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> "_Locator":
+        return cls(function, file)
+
+    def get_cache_path(self) -> str:
+        return str(CACHE_FOLDER)
+
+    def ensure_cache_path(self) -> None:
+        CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
+
+
+class _CacheImpl(CompileResultCacheImpl):
+    _locator_classes: list[type[object]] = [_Locator]  # noqa: RUF012, declared so by Numba
+
+
+class _Cache(FunctionCache):
+    """Numba's cache, shared by processes, and done without where a file cannot be read or written."""
+
+    _impl_class = _CacheImpl
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        try:
+            return super().load_overload(signature, target)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        try:
+            with _locked(CACHE_FOLDER):
+                super().save_overload(signature, compiled)
+        except OSError as error:
+            _warn_once(error.strerror)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold off other processes: two that save a kernel for two types at once mix up Numba's index."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@cache
+def _warn_once(reason: str) -> None:
+    logging.getLogger(__name__).warning(
+        "compiled kernels cannot be kept in %s (%s), so each process compiles them anew, for about 10 s; "
+        "set NUMBA_CACHE_DIR to a folder that can be written",
+        CACHE_FOLDER,
+        reason,
+    )
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a hot loop: no checks, no Python, cached on disk, lets other threads run."""
-    compiled: Callable[..., Any] = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH
-    )(function)
-    return compiled
+    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        compiled._cache = _Cache(function)
+    return compiled  # type: ignore[no-any-return]

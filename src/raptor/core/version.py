@@ -4,7 +4,7 @@ from importlib.metadata import version
 
 __version__ = version("raptor-tissue")
 
-MODEL_VERSION = 2
+MODEL_VERSION = 3
 """Raised when a code change alters results; part of rule parameters and of every file."""
 
 STACK_FORMAT = 2

@@ -18,10 +18,18 @@ from raptor.surrogate.batches import ExampleSet, split_examples
 from raptor.surrogate.files import load, save
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
-from raptor.surrogate.learner import LOSSES
-from raptor.surrogate.losses import adversarial_loss, discriminator_loss, reconstruction_loss
+from raptor.surrogate.learner import LOSSES, Learner
+from raptor.surrogate.losses import (
+    FAIR,
+    adversarial_loss,
+    almost_fair_score,
+    discriminator_loss,
+    reconstruction_loss,
+    sample_loss,
+)
 from raptor.surrogate.networks import NETWORKS, Discriminator
-from raptor.surrogate.rules import Architecture, ModelRules
+from raptor.surrogate.networks.blocks import FilmNorm
+from raptor.surrogate.rules import Architecture, ModelRules, TrainingRules
 from raptor.surrogate.training import joined, train
 
 BOX = Mould(shapely.box(-10, -5, 10, 5))
@@ -68,6 +76,51 @@ def test_losses():
     assert float(adversarial_loss(sure)) == pytest.approx(0, abs=1e-6)
     assert float(discriminator_loss(sure, -sure)) == pytest.approx(0, abs=1e-6)
     assert float(discriminator_loss(unsure, unsure)) == pytest.approx(np.log(2))
+
+
+def test_the_score_of_samples_is_the_almost_fair_crps():
+    """Against the formula of Lang et al. (2024) written out, with numbers as fields."""
+    rng = torch.Generator().manual_seed(0)
+    samples, target = torch.randn(5, 3, generator=rng), torch.randn(5, generator=rng)
+    found = almost_fair_score(samples, target, torch.abs)
+    for row, x, y in zip(found.tolist(), samples.tolist(), target.tolist(), strict=True):
+        error = np.mean([abs(each - y) for each in x])
+        between = sum(abs(a - b) for a in x for b in x)
+        fair, plain = error - between / (2 * 3 * 2), error - between / (2 * 3 * 3)
+        assert row == pytest.approx(FAIR * fair + (1 - FAIR) * plain, abs=1e-6)
+
+
+def test_samples_of_the_right_distribution_score_best():
+    rng = torch.Generator().manual_seed(0)
+    target, noise = torch.randn(4000, 8, 8, 8, generator=rng), torch.randn(4000, 2, 8, 8, 8, generator=rng)
+    right = float(sample_loss(noise, target))
+    for wrong in (0 * noise, 0.6 * noise, 1.6 * noise, noise + 0.4):
+        assert float(sample_loss(wrong, target)) > right
+    # What is the same all over an image: samples of each pixel by itself are not.
+    alike, smooth = target[..., :1, :1].expand_as(target), noise[..., :1, :1].expand_as(noise)
+    assert float(sample_loss(noise, alike)) > float(sample_loss(smooth, alike))
+
+
+def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
+    architecture = Architecture(pixels=16, base_channels=4, noise=4)
+    rules = TrainingRules(epochs=200, learning_rate=3e-3)
+    learner = Learner(architecture, SCALING, rules, 0, torch.device("cpu"))
+    learner.start_epoch(0)
+    inputs = torch.zeros(16, 5, 16, 16)
+    inputs[:, 0] = 1.0
+    target = torch.zeros(16, 8, 16, 16)
+    target[:, 0] = target[:, 4] = 1.0
+    target[:8, 1], target[8:, 1] = 1.0, -1.0  # tension of either sign
+    for _ in range(60):
+        learner.step(inputs, target)
+    learner.generator.eval()
+    stream = torch.Generator().manual_seed(1)
+    with torch.no_grad():
+        answers = learner.generator.answers(inputs[:1], torch.tensor([256.0]), 64, stream)[0, :, 1]
+    means = answers.mean((1, 2))
+    assert (means.abs() > 0.5).float().mean() > 0.7
+    assert abs(float(means.mean())) < 0.5
+    assert float(answers.std((1, 2)).mean()) < 0.5 * float(means.std())
 
 
 @pytest.fixture
@@ -145,6 +198,37 @@ def test_other_networks_learn_without_a_discriminator(training, network):
     trained = training(3, "other.pt", network=network, learning_rate=3e-3, adversarial=0.0)
     assert learnt(trained)
     assert (trained.history["discriminator_loss"] == 0).all()
+
+
+def test_a_sampler_starts_from_a_network_that_gives_a_mean(training):
+    plain = {"network": "film_unet", "adversarial": 0.0}
+    mean = training(2, "mean.pt", **plain)
+    weights = mean.generator.state_dict()
+    started = training(1, "started.pt", "b", weights, noise=4, learning_rate=1e-12, **plain)
+    assert torch.allclose(
+        started.generator.network.stem.convolution.weight, weights["network.stem.convolution.weight"]
+    )
+    assert learnt(training(4, "sampler.pt", "c", weights, noise=4, **plain))
+    with pytest.raises(ValidationError, match="fno has no modulation"):
+        ModelRules(network="fno", noise=4)
+
+
+def test_samples_are_outcomes_of_their_own(model_folder):
+    with pytest.raises(RaptorError, match="gives one mean"):
+        load(model_folder).sample(BOX, CellParameters(0.5, 0.5, 0.3))
+    architecture = Architecture(pixels=32, base_channels=4, noise=4)
+    members = tuple(Generator(architecture, SCALING) for _ in range(2))
+    for member in members:
+        torch.nn.init.normal_(member.network.embed.noise.weight)
+        for module in member.modules():
+            if isinstance(module, FilmNorm):
+                torch.nn.init.normal_(module.modulation.weight, 0.0, 0.1)
+    surrogate = Surrogate(members, architecture, SCALING, 4, 32)
+    samples = surrogate.sample(BOX, CellParameters(0.5, 0.5, 0.3), 5, seed=3)
+    assert samples.shape == (5, 8, 32, 32)
+    assert np.array_equal(samples, surrogate.sample(BOX, CellParameters(0.5, 0.5, 0.3), 5, seed=3))
+    assert (samples.std(axis=0).max(axis=(1, 2)) > 0).all()
+    assert samples[:, 0].sum(axis=(1, 2)) == pytest.approx(surrogate.cast(BOX).n_cells, rel=1e-5)
 
 
 def test_training_resumed_is_training_undisturbed(training, monkeypatch):

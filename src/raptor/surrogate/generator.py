@@ -1,5 +1,8 @@
 """From scaled inputs to scaled fields: a network, and the physics of its outputs."""
 
+from collections.abc import Mapping
+
+import torch
 from torch import Tensor, nn
 
 from raptor.dataset.scaling import Scaling
@@ -14,12 +17,33 @@ class Generator(nn.Module):
     def __init__(self, architecture: Architecture, scaling: Scaling) -> None:
         super().__init__()
         self.network = NETWORKS[architecture.network](architecture)
+        self.noise = architecture.noise
         self.physical = PhysicalFields(scaling) if architecture.network in PHYSICAL else None
 
-    def forward(self, inputs: Tensor, cells: Tensor) -> Tensor:
-        """Fields (n, 8, y, x) of inputs (n, 5, y, x) and numbers of cells (n,)."""
-        found: Tensor = self.network(inputs)
+    def forward(self, inputs: Tensor, cells: Tensor, noise: Tensor | None = None) -> Tensor:
+        """Fields (n, 8, y, x) of inputs (n, 5, y, x), numbers of cells (n,) and noise (n, numbers) if any."""
+        found: Tensor = self.network(inputs) if noise is None else self.network(inputs, noise)
         if self.physical is None:
             return found
         fields: Tensor = self.physical(found.float(), 0.5 * (inputs[:, :1] + 1), cells)
         return fields
+
+    def answers(self, inputs: Tensor, cells: Tensor, count: int, stream: torch.Generator) -> Tensor:
+        """Outcomes (n, count, 8, y, x) by noise drawn from a stream, or the one mean (n, 1, 8, y, x)."""
+        if not self.noise:
+            return torch.stack([self(inputs, cells)], dim=1)
+        noise = torch.randn(count, len(inputs), self.noise, generator=stream).to(inputs.device)
+        return torch.stack([self(inputs, cells, each) for each in noise], dim=1)
+
+    def start_from(self, weights: Mapping[str, Tensor]) -> None:
+        """Take up the weights of another network, which need not have noise where this one has.
+
+        Raises
+        ------
+        RuntimeError
+            Where they are of another architecture.
+        """
+        own = {
+            name: value for name, value in self.state_dict().items() if name.endswith("embed.noise.weight")
+        }
+        self.load_state_dict(own | dict(weights))

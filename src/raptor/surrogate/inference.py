@@ -175,17 +175,40 @@ class Surrogate:
         (fine,) = interpolate(coarse[None], size=2 * (self.pixels,), mode="bilinear").numpy()
         return Ensemble(fields[0], fine, fields[1:, 0])
 
+    def sample(
+        self, mould: Mould | CastMould, parameters: CellParameters, count: int = 8, seed: int = 0
+    ) -> NDArray[np.float32]:
+        """Outcomes (count, 8, y, x) of one mould in physical units, each as a simulation might end.
+
+        The networks take turns; every outcome has noise and an image of D4 of its own.
+
+        Raises
+        ------
+        RaptorError
+            As `predict`, and where the networks give one mean.
+        """
+        if not self.architecture.noise:
+            raise RaptorError("this model gives one mean, no samples; train one with surrogate.noise")
+        cast, stream = self.cast(mould), torch.Generator().manual_seed(seed)
+        elements = [Element.from_index(int(n)) for n in torch.randint(8, (count,), generator=stream)]
+        inputs, cells = self._inputs(cast, [parameters], elements)
+        scaled = torch.empty(count, len(FIELDS), *inputs.shape[2:])
+        with torch.no_grad():
+            for number, member in enumerate(self.members):
+                own = slice(number, None, len(self.members))
+                scaled[own] = member.answers(inputs[own], cells[own], 1, stream)[:, 0]
+        fields = torch.from_numpy(self.scaling.inverse(scaled.numpy()))
+        back = torch.stack([apply(f, e.inverse) for f, e in zip(fields, elements, strict=True)])
+        return self._obey(deconvolve(back, self.pixels), cast)
+
     def ratios(self, density: NDArray[np.floating], cast: CastMould) -> NDArray[np.float64]:
         """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
         return shape_ratios(density, cast, self.threshold)
 
-    def _answers(
+    def _inputs(
         self, cast: CastMould, cells: Sequence[CellParameters], elements: Sequence[Element]
-    ) -> Tensor:
-        """What each network says of each image under D4, moved back: (n, members, elements, 8, y', x').
-
-        In physical units, on the raster that networks work on.
-        """
+    ) -> tuple[Tensor, Tensor]:
+        """Scaled inputs (n * elements, 5, y', x') and numbers of cells, on the networks' raster."""
         for parameters in cells:
             parameters.require_sampled("prediction")
         pixels = self.architecture.pixels
@@ -194,18 +217,34 @@ class Surrogate:
         scaled_inputs = [scale_inputs(depression, tethers, p) for p in cells for depression, tethers in moved]
         inputs = torch.from_numpy(np.stack(scaled_inputs))
         # Fields are per pixel of the full raster, whose block averages the networks give.
-        counts = torch.full((len(inputs),), cast.n_cells * (pixels / self.pixels) ** 2)
+        return inputs, torch.full((len(inputs),), cast.n_cells * (pixels / self.pixels) ** 2)
+
+    def _answers(
+        self, cast: CastMould, cells: Sequence[CellParameters], elements: Sequence[Element]
+    ) -> Tensor:
+        """What each network says of each image under D4, moved back: (n, members, elements, 8, y', x').
+
+        In physical units, on the networks' raster. Networks that sample say one outcome of each.
+        """
+        inputs, counts = self._inputs(cast, cells, elements)
         parts = list(zip(torch.split(inputs, BATCH), torch.split(counts, BATCH), strict=True))
+        stream = torch.Generator().manual_seed(0)
         with torch.no_grad():
-            scaled = [torch.cat([member(*part) for part in parts]) for member in self.members]
+            scaled = [
+                torch.cat([member.answers(*part, 1, stream)[:, 0] for part in parts])
+                for member in self.members
+            ]
         fields = torch.from_numpy(self.scaling.inverse(torch.stack(scaled, dim=1).numpy()))
         fields = fields.reshape(len(cells), len(elements), *fields.shape[1:])
         back = [apply(fields[:, number], element.inverse) for number, element in enumerate(elements)]
         return torch.stack(back, dim=2)
 
     def _finish(self, means: Tensor, cast: CastMould) -> NDArray[np.float32]:
-        """Fields (n, 8, y, x) of the whole raster, obeying the physics, from means (n, 8, y', x')."""
-        fields = with_sign(deconvolve(means, self.pixels))
+        """Fields (n, 8, y, x) of the whole raster from means (n, 8, y', x') of magnitudes."""
+        return self._obey(with_sign(deconvolve(means, self.pixels)), cast)
+
+    def _obey(self, fields: Tensor, cast: CastMould) -> NDArray[np.float32]:
+        """Fields (n, 8, y, x) of the whole raster, projected onto the physics unless they obey already."""
         if self.members[0].physical is None or self.architecture.pixels != self.pixels:
             depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
             fields = project(fields, depression, torch.tensor([float(cast.n_cells)]))

@@ -8,9 +8,12 @@ from torch import Tensor, nn
 
 from raptor.dataset.scaling import Scaling
 from raptor.surrogate.generator import Generator
-from raptor.surrogate.losses import adversarial_loss, discriminator_loss, reconstruction_loss
+from raptor.surrogate.losses import adversarial_loss, discriminator_loss, reconstruction_loss, sample_loss
 from raptor.surrogate.networks import Discriminator
 from raptor.surrogate.rules import Architecture, TrainingRules
+
+SAMPLES = 2
+"""Outcomes that a network with noise draws of every example in a step."""
 
 LOSSES = ("generator_loss", "reconstruction_loss", "discriminator_loss")
 
@@ -58,8 +61,15 @@ class Learner:
 
     def step(self, inputs: Tensor, target: Tensor) -> Tensor:
         """Improve the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
-        prediction = self._evaluate("generator", inputs, cells_of(target, self.scaling))
-        reconstruction = reconstruction_loss(prediction, target, signed="discriminator" in self.networks)
+        cells = cells_of(target, self.scaling)
+        if self.generator.noise:
+            noise = torch.randn(SAMPLES * len(inputs), self.generator.noise, device=inputs.device)
+            repeated = inputs.repeat_interleave(SAMPLES, 0), cells.repeat_interleave(SAMPLES, 0)
+            samples = self._evaluate("generator", *repeated, noise).reshape(-1, SAMPLES, *target.shape[1:])
+            prediction, reconstruction = samples[:, 0], sample_loss(samples, target)
+        else:
+            prediction = self._evaluate("generator", inputs, cells)
+            reconstruction = reconstruction_loss(prediction, target, signed="discriminator" in self.networks)
         total = self.rules.reconstruction_weight * reconstruction
         adversary = torch.zeros((), device=inputs.device)
         if "discriminator" in self.networks:

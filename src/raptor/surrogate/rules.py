@@ -1,8 +1,8 @@
 """What a model is and how it is trained: blocks of keys that configurations hold and the package works by."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from raptor.core.blocks import Block, Name, Positive
 
@@ -21,6 +21,19 @@ class Architecture(Block):
         "those of the data set where they are smaller",
     )
     base_channels: int = Field(16, ge=1, le=256, description="channels of the first layer (pix2pix: 64)")
+    noise: int = Field(
+        0,
+        ge=0,
+        le=256,
+        description="random numbers that modulate features beside the parameters: each draw gives one "
+        "outcome of many, trained by the CRPS; 0: the network gives one mean",
+    )
+
+    @model_validator(mode="after")
+    def _can_sample(self) -> Self:
+        if self.noise and self.network not in ("film_unet", "pix2pix_film"):
+            raise ValueError(f"noise: {self.network} has no modulation; choose film_unet or noise: 0")
+        return self
 
 
 class TrainingRules(Block):

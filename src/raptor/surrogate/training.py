@@ -18,6 +18,7 @@ from raptor.core.files import atomic_path
 from raptor.surrogate.batches import ExampleSet, keep_if_they_fit
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.learner import LOSSES, Learner, cells_of
+from raptor.surrogate.losses import almost_fair_score
 from raptor.surrogate.rules import Architecture, TrainingRules
 from raptor.symmetry import FIELDS
 
@@ -26,6 +27,9 @@ log = logging.getLogger(__name__)
 SCORED = [FIELDS.index(field) for field in ("density", "sxsx", "sysy", "sxsy")]
 """Fields of the validation error: shape and alignment. The sign of sxsz and sysz is spontaneous, and
 tension nearly cancels where nothing pulls, so their error says little of the network."""
+
+VALIDATION_SAMPLES = 4
+"""Outcomes of each validation example, of networks that sample."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def train(
     keep_if_they_fit([training, validation], place)
     learner = Learner(architecture, training.scaling, rules, seed % 2**63, place)
     if initial_weights is not None:
-        learner.generator.load_state_dict(initial_weights)
+        learner.generator.start_from(initial_weights)
     history, best = _resume(learner, checkpoint, identity)
     for epoch in range(len(history), rules.epochs):
         row = _train_epoch(learner, training, validation, seed, epoch, place)
@@ -148,17 +152,25 @@ def validation_error(
     """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
 
     Error and variance are summed over the examples before they are divided: an example in which
-    nothing happens, and whose own variance is next to nothing, does not drown the others.
+    nothing happens, and whose own variance is next to nothing, does not drown the others. Of networks
+    that sample, the CRPS stands in place of the root mean square error.
     """
     generator.eval()
+    power = 1 if generator.noise else 2
+    stream = torch.Generator().manual_seed(0)
     error, variance = torch.zeros(2, len(SCORED), dtype=torch.float64, device=device)
     with torch.no_grad():
         for inputs, target in examples.batches(range(len(examples)), batch_size, device):
-            prediction = generator(inputs, cells_of(target, examples.scaling))[:, SCORED].double()
-            wanted = target[:, SCORED].double()
-            error += ((prediction - wanted) ** 2).mean(dim=(2, 3)).sum(dim=0)
+            cells, wanted = cells_of(target, examples.scaling), target[:, SCORED].double()
+            answers = generator.answers(inputs, cells, VALIDATION_SAMPLES, stream)[:, :, SCORED].double()
+            if generator.noise:
+                found = almost_fair_score(answers, wanted, torch.abs)
+            else:
+                found = (answers[:, 0] - wanted) ** 2
+            error += found.mean(dim=(2, 3)).sum(dim=0)
             variance += wanted.var(dim=(2, 3), correction=0).sum(dim=0)
-    return float(torch.sqrt(error / variance.clamp(min=1e-12)).mean())
+    mean, deviation = error / len(examples), torch.sqrt(variance.clamp(min=1e-12) / len(examples))
+    return float((mean ** (1 / power) / deviation).mean())
 
 
 def joined(begun: pd.DataFrame, history: pd.DataFrame) -> pd.DataFrame:

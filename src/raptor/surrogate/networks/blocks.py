@@ -1,6 +1,7 @@
 """Feature-wise linear modulation: parameters scale and shift every normalised channel.
 
-FiLM (E. Perez et al. 2018, arXiv:1709.07871), in place of parameters as constant images.
+FiLM (E. Perez et al. 2018, arXiv:1709.07871), in place of parameters as constant images. Where noise joins
+them, a network samples outcomes (functional generative networks, Alet et al. 2025, arXiv:2506.10772).
 """
 
 from torch import Tensor, nn
@@ -13,18 +14,27 @@ MASKS = 2
 EMBEDDING = 64
 """Numbers that parameters are embedded in."""
 
+NOISE_WEIGHT = 0.05
+"""Deviation of the first weights of noise: little, so that a network starts from the mean that it knows."""
+
 
 class ParameterEmbedding(nn.Module):
-    """Embeds the parameters of scaled inputs (n, 5, y, x) in (n, EMBEDDING) numbers."""
+    """Embeds the parameters of scaled inputs (n, 5, y, x), and noise if any, in (n, EMBEDDING) numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, noise: int = 0) -> None:
         super().__init__()
         first, second = nn.Linear(len(INPUTS) - MASKS, EMBEDDING), nn.Linear(EMBEDDING, EMBEDDING)
         self.layers = nn.Sequential(first, nn.SiLU(), second, nn.SiLU())
+        self.noise = nn.Linear(noise, EMBEDDING, bias=False) if noise else None
+        if self.noise is not None:
+            nn.init.normal_(self.noise.weight, 0.0, NOISE_WEIGHT)
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """The constant images of the parameters are read at one pixel."""
-        embedding: Tensor = self.layers(inputs[:, MASKS:, 0, 0])
+    def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
+        """The constant images of the parameters are read at one pixel; noise is (n, numbers)."""
+        features: Tensor = self.layers[0](inputs[:, MASKS:, 0, 0])
+        if self.noise is not None:
+            features = features + self.noise(noise)
+        embedding: Tensor = self.layers[1:](features)
         return embedding
 
 

@@ -22,7 +22,7 @@ SQUARE = 2
 
 def build(architecture: Architecture) -> nn.Module:
     """The network of an architecture."""
-    return FilmUNet(architecture.base_channels)
+    return FilmUNet(architecture.base_channels, architecture.noise)
 
 
 class FilmConvolution(nn.Module):
@@ -57,10 +57,10 @@ class ResidualBlock(nn.Module):
 class FilmUNet(nn.Module):
     """From scaled inputs (n, 5, y, x) to eight free channels (n, 8, y, x) for `PhysicalFields`."""
 
-    def __init__(self, base_channels: int) -> None:
+    def __init__(self, base_channels: int, noise: int = 0) -> None:
         super().__init__()
         widths = [base_channels * width for width in WIDTHS]
-        self.embed = ParameterEmbedding()
+        self.embed = ParameterEmbedding(noise)
         self.stem = FilmConvolution(MASKS * SQUARE**2, widths[0])
         self.encoder = nn.ModuleList(ResidualBlock(width) for width in widths)
         self.down = nn.ModuleList(FilmConvolution(a, b, stride=2) for a, b in pairwise(widths))
@@ -69,9 +69,9 @@ class FilmUNet(nn.Module):
         self.head = nn.Conv2d(widths[0], len(FIELDS) * SQUARE**2, 3, padding=1)
         nn.init.normal_(self.head.weight, 0.0, 0.01)
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """Free channels."""
-        embedding = self.embed(inputs)
+    def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
+        """Free channels; one outcome of many where there is noise (n, numbers)."""
+        embedding = self.embed(inputs, noise)
         features = silu(self.stem(pixel_unshuffle(inputs[:, :MASKS], SQUARE), embedding))
         skips = []
         for level, residual in enumerate(self.encoder):

@@ -24,7 +24,8 @@ def build(architecture: Architecture) -> nn.Module:
 
 def build_film(architecture: Architecture) -> nn.Module:
     """The same, but for parameters that scale and shift its features."""
-    return UNet(architecture.pixels, architecture.base_channels, film=True)
+    embed = ParameterEmbedding(architecture.noise)
+    return UNet(architecture.pixels, architecture.base_channels, embed)
 
 
 class Down(nn.Sequential):
@@ -57,14 +58,15 @@ class Up(nn.Sequential):
 class UNet(nn.Module):
     """A U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled.
 
-    With `film`, parameters modulate its features, and its first layer sees the masks alone.
+    With an embedding, parameters modulate its features, and its first layer sees the masks alone.
     """
 
-    def __init__(self, pixels: int, base_channels: int, *, film: bool = False) -> None:
+    def __init__(self, pixels: int, base_channels: int, embed: ParameterEmbedding | None = None) -> None:
         super().__init__()
+        film = embed is not None
         depth = int(math.log2(pixels))
         channels = [base_channels * min(2**level, WIDEST) for level in range(depth)]
-        self.embed = ParameterEmbedding() if film else None
+        self.embed = embed
         self.inputs = MASKS if film else len(INPUTS)
         self.down = nn.ModuleList()
         for level, (before, after) in enumerate(zip([self.inputs, *channels[:-1]], channels, strict=True)):
@@ -80,9 +82,9 @@ class UNet(nn.Module):
         )
         initialise(self)
 
-    def forward(self, inputs: Tensor) -> Tensor:
+    def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
         """Scaled fields. The last layer is linear: fields of new moulds may exceed 1."""
-        embedding = None if self.embed is None else self.embed(inputs)
+        embedding = None if self.embed is None else self.embed(inputs, noise)
         skips = []
         features = inputs[:, : self.inputs]
         for down in self.down:

@@ -1,102 +1,365 @@
-"""A drawing of a mould in its own units: what SVG and PNG files have in common."""
+"""A drawing of a mould, before its lengths are in l0: what SVG, DXF, GeoJSON and pictures have in common.
 
-from dataclasses import dataclass
-from math import floor, log10
+Closed lines are shapes; open ones count where several of them close a shape together, as in CAD drawings.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, floor, log10
 from pathlib import Path
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether, require_standing
+from raptor.moulds.geometry import SMALLEST_TETHER, Circle, Mould, PolygonTether, Tether, require_standing
 
+FITTED = 52.0  # l0; the longest side of a drawing that does not say its scale: the library's median
 ROW = 0.5  # l0; rows of sites of all layers, along x and along y
-LARGEST_BLUR = 0.125  # l0; no wall is moved farther than this
+LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this
+DIGITS = 4  # of a coordinate in l0, after the point: drawing programs and renderers round below that
+ROUND = 1e-3  # of its radius: how far a round shape may leave a circle
+SAME = 1e-3  # of its area: a shape that differs less from another is drawn twice
+GAP, WIDE_GAP = 2e-4, 0.02  # of the drawing's longest side: ends that meet; ends that were meant to
+PAGE = 0.98  # of the page, along both sides, that a background covers
+ROLES = {"outline": ("outline", "depression"), "tether": ("tether", "post")}
+FARTHEST = 1e9  # drawing units; a coordinate beyond it is a mistake
 
 
 @dataclass(frozen=True)
 class Page:
-    """The square that represents the frame of 62.5 l0: centre and side, drawing units, y up."""
+    """The sheet that a drawing stands on: lower left corner and sides, drawing units, y up."""
 
     x: float
     y: float
-    side: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A closed line of a drawing, in its units, y up; `role` is "outline", "tether" or ""."""
+
+    name: str
+    polygon: shapely.Polygon
+    role: str = ""
+
+    @property
+    def size(self) -> float:
+        """Area of its convex hull: a shape that crosses itself has one, too."""
+        return float(self.polygon.convex_hull.area)
+
+    @cached_property
+    def tether(self) -> Tether:
+        """The shape as a tether, round where it is drawn round."""
+        return circle_of(self.polygon) or PolygonTether(self.polygon)
+
+
+@dataclass(frozen=True)
+class Line:
+    """An open line of a drawing: corners (n, 2)."""
+
+    name: str
+    corners: NDArray[np.float64]
+    role: str = ""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """An outline and tethers, in drawing units, y up.
+    """Closed shapes and open lines, in drawing units, y up.
 
     Parameters
     ----------
-    outline : shapely.Polygon
-        The depression, tethers not cut out.
-    tethers : tuple of (str, Tether)
-        Each with its name in messages.
+    shapes : tuple of Shape
+    lines : tuple of Line
     page : Page or None
-        None if the file does not give the size of its page.
+        None where the file does not say how large its page is.
     unit : str
-        Name of a drawing unit in messages.
+        What messages call a drawing unit.
+    mm : float or None
+        Millimetres a unit, where the file has a real unit.
+    l0 : float or None
+        l0 a unit, where the file says so.
     blur : float
         How finely the drawing tells where a wall is, drawing units. A corner nearer than this to a row of
-        sites is put on it: sites on a wall hold no cell, and noise must not decide about a whole row.
+        sites is put on it, so that noise does not decide about a whole row.
     """
 
-    outline: shapely.Polygon
-    tethers: tuple[tuple[str, Tether], ...]
-    page: Page | None
-    unit: str
+    shapes: tuple[Shape, ...]
+    lines: tuple[Line, ...] = ()
+    page: Page | None = None
+    unit: str = "user unit"
+    mm: float | None = None
+    l0: float | None = None
     blur: float = 0.0
 
-    def mould(self, path: Path, scale: float | None) -> Mould:
+    def mould(self, path: Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
         """The mould drawn in the file `path`, lengths in l0.
 
-        With a scale (l0 per drawing unit) the centre of the outline's bounding box is the origin; without
-        one the page is the frame.
+        The middle of the outline's bounding box is the origin. Without a scale (l0 a drawing unit, or
+        millimetres an l0) the outline's longest side becomes 52 l0; but where the page is a square of 62.5
+        units, it is the frame.
 
         Raises
         ------
         RaptorError
-            If the mould cannot be cast, or neither a scale nor a page gives its size.
+            Where no outline is drawn or several, or the mould cannot be cast; a scale that fits is named.
         """
         try:
-            x, y, unit = self._placement(scale)
-            blur = min(self.blur * unit, LARGEST_BLUR)
-
-            def placed(shape: Tether) -> Tether:
-                return _on_rows(shape.shifted(-x, -y).scaled(unit), blur)
-
-            outline = placed(PolygonTether(self.outline)).polygon
-            Mould(
-                outline, name=path.stem
-            )  # raises for an invalid outline before tethers are compared with it
-            tethers = tuple(placed(tether) for _, tether in self.tethers)
-            for (called, _), tether in zip(self.tethers, tethers, strict=True):
-                require_standing(tether, outline, f"{path.stem}: {called}")
-            return Mould(outline, tethers, name=path.stem)
+            outline, tethers = _told_apart(self._closed(), self.page)
+            placement = self._placement(outline, scale, mm_per_l0)
+            blur = min(self.blur * placement.scale, LARGEST_BLUR)
+            walls = _placed(PolygonTether(outline.polygon), placement, blur).polygon
+            bare = Mould(walls, name=path.stem)  # so that tethers are held against a valid outline
+            standing = tuple(_placed(shape.tether, placement, blur) for shape in tethers)
+            for shape, tether in zip(tethers, standing, strict=True):
+                _require_wide(tether, shape.name, placement, walls)
+                require_standing(tether, walls, f"{path.stem}: tether {shape.name}")
+            return replace(
+                bare, tethers=standing, mm_per_l0=placement.mm_per_l0, note=placement.note(self.unit)
+            )
         except RaptorError as error:
             raise RaptorError(f"mould file {path}: {error}") from error
 
-    def _placement(self, scale: float | None) -> tuple[float, float, float]:
-        """The origin (x, y) in drawing units, and l0 per drawing unit."""
-        if scale is None and self.page is not None:
-            return self.page.x, self.page.y, IMAGE_SIZE / self.page.side
+    def _closed(self) -> list[Shape]:
+        """The shapes, and those that open lines close together; each once."""
+        corners = [shapely.get_coordinates(shape.polygon) for shape in self.shapes]
+        corners += [line.corners for line in self.lines]
+        everything = np.concatenate(corners) if corners else np.zeros((0, 2))
+        if everything.size and not np.abs(everything).max() < FARTHEST:
+            raise RaptorError(f"a coordinate is beyond {FARTHEST:g}, or is no number; look at its corners")
+        closed, longest = list(self.shapes), float(np.ptp(everything, axis=0).max(initial=0.0))
+        if self.lines:
+            closed += joined(self.lines, GAP * longest)
+            _require_closed(self.lines, closed, longest)
+        kept: list[Shape] = []
+        for shape in sorted(closed, key=lambda shape: shape.role == ""):  # of twins, the one with a role
+            if not any(_same(shape, other) for other in kept):
+                kept.append(shape)
+        return [shape for shape in closed if shape in kept]
+
+    def _placement(self, outline: Shape, scale: float | None, mm_per_l0: float | None) -> "Placement":
+        """Where the origin lies, and how long a drawing unit is."""
+        x0, y0, x1, y1 = outline.polygon.bounds
+        width, height = x1 - x0, y1 - y0
+        longest, middle = max(width, height), ((x0 + x1) / 2, (y0 + y1) / 2)
+        if not longest > 0:
+            raise RaptorError("the outline is a point; draw a shape that encloses an area")
+        named = "scale"
+        if scale is None and mm_per_l0 is not None and self.mm is not None:
+            scale, named = self.mm / mm_per_l0, "mm-per-l0"
         if scale is None:
+            scale = self.l0
+        if scale is None and self._is_on_frame(outline):
+            assert self.page is not None
+            middle, scale = (self.page.x + IMAGE_SIZE / 2, self.page.y + IMAGE_SIZE / 2), 1.0
+        fitted = scale is None
+        scale = FITTED / longest if scale is None else scale
+        if mm_per_l0 is None and self.mm is not None:
+            mm_per_l0 = self.mm / scale
+        made = Placement(*middle, scale, mm_per_l0, fitted)
+        if not 1 <= longest * scale <= IMAGE_SIZE * (1 + 1e-6):
             raise RaptorError(
-                f"it does not say how long a {self.unit} is; give --scale, in l0 per {self.unit}, or the "
-                "attribute data-l0 or viewBox"
+                f"the outline is {width * scale:.4g} x {height * scale:.4g} l0 at {scale:.4g} l0 a "
+                f"{self.unit}, and the frame is {IMAGE_SIZE} l0 wide; {self._advice(named, longest)}"
             )
-        x0, y0, x1, y1 = self.outline.bounds
-        width, height = (x1 - x0) * scale, (y1 - y0) * scale
-        if max(width, height) > IMAGE_SIZE * (1 + 1e-9):
-            largest = _rounded_down(scale * IMAGE_SIZE / max(width, height))
-            raise RaptorError(
-                f"the outline is {width:.4g} x {height:.4g} l0 at {scale:.4g} l0 per {self.unit}, and the "
-                f"frame is {IMAGE_SIZE} l0 wide; give a scale of {largest} or less"
-            )
-        return (x0 + x1) / 2, (y0 + y1) / 2, scale
+        return made
+
+    def _is_on_frame(self, outline: Shape) -> bool:
+        """Whether the page is a square of 62.5 units, and the outline lies on it."""
+        if self.page is None or not np.allclose((self.page.width, self.page.height), IMAGE_SIZE, rtol=1e-6):
+            return False
+        sheet = shapely.box(self.page.x, self.page.y, self.page.x + IMAGE_SIZE, self.page.y + IMAGE_SIZE)
+        return bool(sheet.buffer(10.0**-DIGITS).covers(outline.polygon.envelope))
+
+    def _advice(self, named: str, longest: float) -> str:
+        """The scale that fits an outline whose longest side is given in drawing units."""
+        if named == "mm-per-l0" and self.mm is not None:
+            smallest = rounded(self.mm * longest / IMAGE_SIZE, up=True)
+            return f"give --mm-per-l0 {smallest} or more ({rounded(self.mm * longest / FITTED, up=True)} fits)"
+        largest = rounded(IMAGE_SIZE / longest)
+        return f"give a scale of {largest} or less (--scale {rounded(FITTED / longest)} fits)"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The point (x, y) of a drawing that is the frame's origin, l0 a drawing unit, and what they came from."""
+
+    x: float
+    y: float
+    scale: float
+    mm_per_l0: float | None
+    fitted: bool
+
+    def note(self, unit: str) -> str:
+        """How the drawing was scaled, for people."""
+        said = f"{self.scale:.4g} l0 a {unit}"
+        return f"fitted to the frame at {said} (overrule by --scale)" if self.fitted else said
+
+
+def role_of(*words: str) -> str:
+    """What a name calls a shape: "outline", "tether" or ""."""
+    for word in words:
+        for role, beginnings in ROLES.items():
+            if word.strip().lower().startswith(beginnings):
+                return role
+    return ""
+
+
+def circle_of(polygon: shapely.Polygon) -> Circle | None:
+    """The circle that a polygon of many corners draws, if it is one."""
+    corners = shapely.get_coordinates(polygon.exterior)
+    if len(corners) < 16 or polygon.interiors or not polygon.is_valid:
+        return None
+    x0, y0, x1, y1 = polygon.bounds
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    reach = np.hypot(corners[:, 0] - x, corners[:, 1] - y)
+    radius = float((reach.max() + reach.min()) / 2)
+    steps = np.hypot(*np.diff(corners, axis=0).T)
+    if np.ptp(reach) > 2 * ROUND * radius or steps.max() > 0.5 * radius:
+        return None
+    return Circle(x, y, radius)
+
+
+def joined(lines: Sequence[Line], gap: float) -> list[Shape]:
+    """The shapes that open lines close where their ends lie within `gap` of each other."""
+    ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
+    knots = _knots(ends, gap)
+    met: dict[bytes, tuple[Line, shapely.LineString]] = {}
+    for number, line in enumerate(lines):
+        corners = line.corners.copy()
+        corners[0], corners[-1] = knots[2 * number], knots[2 * number + 1]
+        path = shapely.LineString(corners)
+        if path.length > 0:
+            met.setdefault(path.normalize().wkb, (line, path))  # a line drawn twice counts once
+    shapes = []
+    for polygon in shapely.get_parts(shapely.polygonize([path for _, path in met.values()])):
+        rim = polygon.exterior.buffer(1e-6 * polygon.length)
+        around = [line for line, path in met.values() if rim.covers(path)]
+        role = next((line.role for line in around if line.role), "")
+        shapes.append(Shape(around[0].name, shapely.Polygon(polygon.exterior), role))
+    return shapes
+
+
+def _knots(ends: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
+    """Ends of lines (n, 2), each moved to the middle of those within `gap` of it."""
+    pairs = KDTree(ends).query_pairs(gap, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends),) * 2)
+    _, knot = connected_components(links, directed=False)
+    middles = np.column_stack([np.bincount(knot, ends[:, axis]) for axis in (0, 1)])
+    return np.asarray((middles / np.bincount(knot)[:, None])[knot])
+
+
+def rounded(value: float, up: bool = False) -> str:
+    """A positive number to three digits, never above it, or with `up` never below."""
+    step = 10.0 ** (floor(log10(value)) - 2)
+    return f"{(ceil if up else floor)(value / step * (1 + (-1e-9 if up else 1e-9))) * step:.3g}"
+
+
+def _told_apart(shapes: list[Shape], page: Page | None) -> tuple[Shape, list[Shape]]:
+    """The outline, and the tethers, which all other shapes are."""
+    outlines = [shape for shape in shapes if shape.role == "outline"]
+    if len(outlines) > 1:
+        names = ", ".join(shape.name for shape in outlines)
+        raise RaptorError(
+            f"{len(outlines)} shapes are called outline ({names}); a mould is one connected outline, so keep "
+            "one and call what stands in it tether"
+        )
+    candidates = outlines or [shape for shape in shapes if shape.role != "tether"]
+    if not candidates:
+        raise RaptorError(
+            "it draws no outline; draw the depression as a closed shape and call it 'outline'"
+        )
+    outline = max(candidates, key=lambda shape: shape.size)
+    others = [shape for shape in shapes if shape is not outline]
+    if outlines:
+        return outline, [shape for shape in others if not _is_background(shape, outline, page)]
+    _require_no_background(outline, others, page)
+    return outline, others
+
+
+def _covers_page(shape: Shape, page: Page | None) -> bool:
+    if page is None:
+        return False
+    sheet = shapely.box(page.x, page.y, page.x + page.width, page.y + page.height)
+    return bool(shape.polygon.envelope.intersection(sheet).area >= PAGE**2 * sheet.area)
+
+
+def _is_background(shape: Shape, outline: Shape, page: Page | None) -> bool:
+    """Whether a shape without a role is the sheet that the outline lies on."""
+    return not shape.role and _covers_page(shape, page) and bool(shape.polygon.covers(outline.polygon))
+
+
+def _require_no_background(outline: Shape, others: list[Shape], page: Page | None) -> None:
+    """Raise a RaptorError where the outline seems to be the sheet that the mould is drawn on."""
+    if not others or not _covers_page(outline, page):
+        return
+    second = max(others, key=lambda shape: shape.size)
+    holds = all(second.polygon.envelope.covers(shape.polygon) for shape in others)
+    if holds and (len(others) > 1 or second.size > 0.05 * outline.size):
+        raise RaptorError(
+            f"its largest shape, {outline.name}, is as large as the page and looks like a background; delete "
+            f"it, or call the depression 'outline' (is it {second.name}?)"
+        )
+
+
+def _same(shape: Shape, other: Shape) -> bool:
+    """Whether two shapes are one, drawn twice."""
+    first, second = shape.polygon, other.polygon
+    near = np.abs(np.subtract(first.bounds, second.bounds)).max() <= SAME * np.sqrt(shape.size)
+    if not near or not (first.is_valid and second.is_valid):
+        return bool(near and first.equals(second))
+    return bool(first.symmetric_difference(second).area <= SAME * first.area)
+
+
+def _placed(shape: Tether, placement: Placement, blur: float) -> Tether:
+    """A shape in l0, to as many digits as count."""
+    moved = _on_rows(shape.shifted(-placement.x, -placement.y).scaled(placement.scale), blur)
+    if isinstance(moved, Circle):
+        return Circle(*(round(value, DIGITS) for value in (moved.x, moved.y, moved.radius)))
+    return PolygonTether(shapely.transform(moved.polygon, lambda corners: np.round(corners, DIGITS) + 0.0))
+
+
+def _require_wide(tether: Tether, name: str, placement: Placement, outline: shapely.Polygon) -> None:
+    """Raise a RaptorError for a tether that is too thin, with the scale at which it is not."""
+    if not tether.polygon.is_valid or tether.polygon.is_empty:
+        return  # told elsewhere
+    half = float(shapely.maximum_inscribed_circle(tether.polygon).length)
+    if half >= 0.999 * SMALLEST_TETHER or half == 0:
+        return
+    x0, y0, x1, y1 = outline.bounds
+    grown = SMALLEST_TETHER / half
+    needed = f"--scale {rounded(placement.scale * grown, up=True)} or more"
+    fits = max(x1 - x0, y1 - y0) * grown <= IMAGE_SIZE
+    advice = f"give {needed}" if fits else "draw it wider (no scale that fits the frame makes it so)"
+    raise RaptorError(
+        f"tether {name} is too thin to hold cells back: {2 * half:.2g} l0 across at "
+        f"{placement.scale:.4g} l0 a unit, {2 * SMALLEST_TETHER} are needed; {advice}"
+    )
+
+
+def _require_closed(lines: Sequence[Line], closed: Sequence[Shape], longest: float) -> None:
+    """Raise a RaptorError where lines nearly close an outline, or one of that name stays open."""
+    outlined = any(shape.role == "outline" for shape in closed)
+    called = [line for line in lines if line.role == "outline" and not outlined]
+    for shape in [] if outlined else joined(lines, WIDE_GAP * longest):
+        around = all(shape.polygon.envelope.covers(other.polygon) for other in closed)
+        if around and not any(_same(shape, other) for other in closed):
+            called.append(next(line for line in lines if line.name == shape.name))
+    if not closed and not called:
+        called.append(max(lines, key=lambda line: float(np.ptp(line.corners, axis=0).max())))
+    if called:
+        (x0, y0), (x1, y1) = called[0].corners[0], called[0].corners[-1]
+        raise RaptorError(
+            f"the outline is not closed: {called[0].name} runs from ({x0:.4g}, {-y0:.4g}) to "
+            f"({x1:.4g}, {-y1:.4g}), and ends farther than {GAP * longest:.2g} from the next line; close it"
+        )
 
 
 def _on_rows(shape: Tether, blur: float) -> Tether:
@@ -108,12 +371,6 @@ def _on_rows(shape: Tether, blur: float) -> Tether:
         rows = np.rint(corners / ROW) * ROW
         return np.where(np.abs(corners - rows) <= blur, rows, corners)
 
-    # Bevelled corners of the picture become corners again.
+    # Corners that the picture had cut off meet again.
     moved = shapely.transform(shape.polygon, snapped).simplify(0.0)
     return PolygonTether(moved) if moved.is_valid and moved.area > 0 else shape
-
-
-def _rounded_down(value: float) -> str:
-    """A positive number rounded down to three digits."""
-    step = 10.0 ** (floor(log10(value)) - 2)
-    return f"{floor(value / step) * step:.3g}"

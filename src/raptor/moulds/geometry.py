@@ -134,6 +134,10 @@ class Mould:
         The class that the generator drew from, a key of `random_moulds.GROUPS`, or "unknown".
     name : str
         Mould id or file name, for messages.
+    mm_per_l0 : float or None
+        Millimetres an l0, where the mould was drawn in a real unit.
+    note : str
+        How a drawing was scaled, for people.
 
     Raises
     ------
@@ -150,6 +154,8 @@ class Mould:
     tethers: tuple[Tether, ...]
     symmetry: str
     name: str = field(compare=False)
+    mm_per_l0: float | None = field(compare=False)
+    note: str = field(compare=False)
 
     def __init__(
         self,
@@ -157,6 +163,8 @@ class Mould:
         tethers: Iterable[Tether | shapely.Polygon] = (),
         symmetry: str = "unknown",
         name: str = "mould",
+        mm_per_l0: float | None = None,
+        note: str = "",
     ) -> None:
         if not isinstance(outline, shapely.Polygon):
             raise RaptorError(
@@ -167,6 +175,7 @@ class Mould:
         standing = tuple(_tether(each, name) for each in (*tethers, *holes))
         # The values of a frozen dataclass cannot be set by name.
         vars(self).update(outline=solid, tethers=standing, symmetry=symmetry, name=name)
+        vars(self).update(mm_per_l0=mm_per_l0, note=note)
         self.validate()
 
     def validate(self) -> None:
@@ -209,21 +218,23 @@ class Mould:
 
     def scaled(self, factor: float) -> "Mould":
         """The mould and its tethers scaled about the origin."""
+        outline = _transform(self.outline, np.eye(2) * factor)
         tethers = tuple(tether.scaled(factor) for tether in self.tethers)
-        return replace(self, outline=_transform(self.outline, np.eye(2) * factor), tethers=tethers)
+        mm_per_l0 = None if self.mm_per_l0 is None else self.mm_per_l0 / factor
+        return replace(self, outline=outline, tethers=tethers, mm_per_l0=mm_per_l0)
 
     def as_feature(self) -> dict[str, Any]:
         """The mould as a GeoJSON feature."""
-        return {
-            "type": "Feature",
-            "geometry": {"type": "Polygon", "coordinates": [_ring(self.outline)]},
-            "properties": {
-                "mould": self.name,
-                "tethers": [tether.as_json() for tether in self.tethers],
-                "symmetry": self.symmetry,
-                "area": self.depression.area,
-            },
+        properties: dict[str, Any] = {
+            "mould": self.name,
+            "tethers": [tether.as_json() for tether in self.tethers],
+            "symmetry": self.symmetry,
+            "area": self.depression.area,
         }
+        if self.mm_per_l0 is not None:
+            properties["mm_per_l0"] = self.mm_per_l0
+        geometry = {"type": "Polygon", "coordinates": [_ring(self.outline)]}
+        return {"type": "Feature", "geometry": geometry, "properties": properties}
 
 
 def _tether(shape: Any, name: str) -> Tether:

@@ -49,7 +49,7 @@ def as_mould(mould: Mould | str | Path) -> Mould:
     )
 
 
-def read_mould(path: str | Path, scale: float | None = None) -> Mould:
+def read_mould(path: str | Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
     """Read a mould of the library, or a file that holds one mould.
 
     Parameters
@@ -74,7 +74,7 @@ def read_mould(path: str | Path, scale: float | None = None) -> Mould:
     if suffix == ".svg":
         from raptor.moulds.svg import read_svg
 
-        return read_svg(path, scale)
+        return read_svg(path).mould(path, scale, mm_per_l0)
     if suffix == ".png":
         from raptor.moulds.bitmap import read_bitmap
 

@@ -1,116 +1,94 @@
-"""Moulds drawn as SVG: closed shapes, distinguished by name or by size (docs/moulds.md).
+"""Moulds drawn as SVG: shapes that a renderer shows, told apart by their names or by their size (docs/moulds.md).
 
-A shape is a visible path, polygon, polyline, rectangle, circle or ellipse; strokes, fills, text, images and
-straight lines are ignored. A path of several pieces is several shapes.
+A shape is a path, polygon, polyline, rectangle, circle or ellipse that is seen; strokes, fills, text and
+images do not count. A path of several pieces is several shapes. An open piece is a shape where it is filled,
+and otherwise a line.
 """
 
+import gzip
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from io import BytesIO
-from math import isclose, isfinite, nan
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import shapely
 import svgelements
+from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input
-from raptor.moulds.drawing import Drawing, Page
-from raptor.moulds.geometry import CIRCLE_SEGMENTS, Circle, Mould, PolygonTether, Tether
+from raptor.moulds.drawing import Drawing, Line, Page, Shape, circle_of, role_of
+from raptor.moulds.geometry import CIRCLE_SEGMENTS
+from raptor.moulds.rendering import SHAPES, Drawn, drawn_shapes, tag_of
 
-OUTLINE = ("outline", "depression")
-TETHER = ("tether", "post")
-LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-SMOOTH = 1e-4  # largest distance of a straightened curve from the drawn one, over the shape's longer side
-SHAPES = {
-    "path": svgelements.Path,
-    "polygon": svgelements.Polygon,
-    "polyline": svgelements.Polyline,
-    "rect": svgelements.Rect,
-    "circle": svgelements.Circle,
-    "ellipse": svgelements.Ellipse,
-}
-DRAWN: Any = tuple(SHAPES.values())
-LENGTHS = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry"}
-LENGTH = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*(px|pt|pc|mm|cm|in|%)?|auto)\s*")
+NAMESPACE = "http://www.w3.org/2000/svg"
+SMOOTH = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
+AGREED = 2e-3  # of a shape's longer side: how far it may lie from where the renderer draws it
+CUT, WHOLE = 0.02, 0.98  # of a shape: clipped away, and not clipped
+LENGTHS = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "x1", "y1", "x2", "y2"}
+LENGTH = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(px|pt|pc|mm|cm|in|%)?\s*")
 PATH_DATA = re.compile(r"\s*([Mm][MmZzLlHhVvCcSsQqTtAaEe\d\s.,+-]*)?")
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
+PIXEL = 25.4 / 96  # mm; a CSS pixel
+DRAWN: Any = (
+    svgelements.Path, svgelements.Polygon, svgelements.Polyline, svgelements.Rect, svgelements.Circle,
+    svgelements.Ellipse, svgelements.SimpleLine,
+)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """A closed piece of a drawing, in user units, y up; `role` is "outline", "tether" or ""."""
-
-    name: str
-    role: str
-    polygon: shapely.Polygon
-    circle: Circle | None = None
-
-    @property
-    def size(self) -> float:
-        """Area of its convex hull, which a shape that crosses itself has too."""
-        return float(self.polygon.convex_hull.area)
-
-    @property
-    def tether(self) -> Tether:
-        """The shape as a tether; a drawn circle stays exactly round."""
-        return self.circle or PolygonTether(self.polygon)
-
-
-def read_svg(path: Path, scale: float | None = None) -> Mould:
-    """Read an SVG file that holds one mould; `scale` is l0 per user unit.
+def read_svg(path: Path) -> Drawing:
+    """Read an SVG file that holds one mould.
 
     Raises
     ------
     RaptorError
-        If the file is not SVG, draws no outline or several, or the mould cannot be cast.
+        Where the file is not SVG, or a shape in it cannot be read.
     """
     path = Path(path)
     where = f"mould file {path}"
-    content = read_input(path, "mould file", "an SVG drawing")
-    root = _root(content, where)
-    for element in root.iter():
-        _require_readable(element, where)
-    if scale is None and "data-l0" in root.attrib:
-        scale = _unit(root.attrib["data-l0"], where)
+    root = _root(read_input(path, "mould file", "an SVG drawing"), where)
     try:
-        drawn = svgelements.SVG.parse(BytesIO(content), reify=False)
-        if not isinstance(drawn, svgelements.SVG):
-            raise ValueError('the root lacks the namespace xmlns="http://www.w3.org/2000/svg"')
-        # svgelements gives CSS pixels; lengths here are the file's own, with y up.
-        matrix = ~svgelements.Matrix(drawn.viewbox_transform or "") * svgelements.Matrix.scale(1, -1)
-        shapes, page = list(_shapes(drawn, "", matrix)), _page(drawn, root)
+        for element in root.iter():
+            _require_readable(element)
+        page, mm, pixels = _page(root)
+        drawn = drawn_shapes(root, pixels)
+        shapes: list[Shape] = []
+        lines: list[Line] = []
+        for shape, geometry in zip(drawn, _geometries([each.element for each in drawn], page), strict=True):
+            for piece in _pieces(shape, geometry):
+                (shapes if isinstance(piece, Shape) else lines).append(piece)  # type: ignore[arg-type]
+    except RaptorError as error:
+        raise RaptorError(f"{where}: {error}") from error
     except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError) as error:
         raise RaptorError(f"{where} cannot be read: {error}; save it again as plain SVG") from error
-    outline, tethers = _told_apart(shapes, where)
-    named = tuple((f"tether {shape.name}", shape.tether) for shape in tethers)
-    return Drawing(outline.polygon, named, page, "user unit").mould(path, scale)
+    return Drawing(tuple(shapes), tuple(lines), page, mm=mm, l0=_scale(root, where))
 
 
-def _root(content: bytes, where: str) -> ElementTree.Element:
-    """The root element of an SVG document."""
+def _root(content: bytes, where: str) -> Element:
+    """The root element of an SVG document, compressed or not."""
     try:
+        if content[:2] == b"\x1f\x8b":
+            content = gzip.decompress(content)
         root = ElementTree.fromstring(content)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
+    except (ElementTree.ParseError, ValueError, LookupError, OSError, EOFError) as error:
         raise RaptorError(
-            f"{where} is not SVG, or is truncated: {error}; save it again as plain SVG"
+            f"{where} is not SVG, or is cut short: {error}; save it again as plain SVG"
         ) from error
-    if _tag(root) != "svg":
-        raise RaptorError(f"{where} is not SVG: its root is <{_tag(root)}>; save it as plain SVG")
+    if tag_of(root) != "svg":
+        raise RaptorError(f"{where} is not SVG: its root is <{tag_of(root)}>; save it as plain SVG")
+    if root.tag != f"{{{NAMESPACE}}}svg":
+        raise RaptorError(f'{where} cannot be read: the root has not the namespace xmlns="{NAMESPACE}"')
     return root
 
 
-def _tag(element: ElementTree.Element) -> str:
-    """An element's name without its namespace."""
-    return str(element.tag).rsplit("}", 1)[-1]
-
-
-def _require_readable(element: ElementTree.Element, where: str) -> None:
-    """Raise a RaptorError for a shape that svgelements would silently drop or truncate."""
-    tag, attributes = _tag(element), element.attrib
+def _require_readable(element: Element) -> None:
+    """Raise a RaptorError for a shape that a renderer would drop, or cut short, without a word."""
+    tag, attributes = tag_of(element), element.attrib
     if tag not in SHAPES:
         return
     try:
@@ -123,119 +101,117 @@ def _require_readable(element: ElementTree.Element, where: str) -> None:
             if len([float(value) for value in corners]) % 2:
                 raise ValueError("points must be pairs of numbers")
         for key in LENGTHS & set(attributes):
-            if not LENGTH.fullmatch(attributes[key]):
+            if not LENGTH.fullmatch(attributes[key]) and attributes[key].strip() != "auto":
                 raise ValueError(f"{key} must be a length")
     except ValueError as error:
         reason = f" ({error})" if str(error) else ""
         raise RaptorError(
-            f"{where}: <{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; "
-            "draw it again, or delete it"
+            f"<{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; draw it again, or take it out"
         ) from error
 
 
-def _unit(text: str, where: str) -> float:
-    """The value of the attribute data-l0: l0 per user unit."""
+def _scale(root: Element, where: str) -> float | None:
+    """The attribute data-l0: l0 a user unit."""
+    text = root.get("data-l0")
+    if text is None:
+        return None
     try:
         value = float(text)
     except ValueError:
         value = nan
     if not (isfinite(value) and value > 0):
-        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 per user unit")
+        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 a user unit")
     return value
 
 
-def _page(drawn: svgelements.SVG, root: ElementTree.Element) -> Page | None:
-    """The page: the viewBox, or else width and height if they are lengths."""
-    box = drawn.viewbox
-    if box is not None and None not in (box.x, box.y, box.width, box.height):
-        x, y, width, height = box.x, box.y, box.width, box.height
-    elif all(root.attrib.get(key, "%").strip()[-1:] not in ("%", "") for key in ("width", "height")):
-        x, y, width, height = 0.0, 0.0, drawn.width, drawn.height
+def _page(root: Element) -> tuple[Page | None, float | None, tuple[float, float]]:
+    """The page in user units, millimetres a user unit where its size has a real unit, and its CSS pixels."""
+    sides = [LENGTH.fullmatch(root.get(key, "")) for key in ("width", "height")]
+    numbers = [float(side[1]) if side and side[4] != "%" and float(side[1]) > 0 else None for side in sides]
+    units = [side[4] or "px" if side else "px" for side in sides]
+    box = [float(value) for value in root.get("viewBox", "").replace(",", " ").split()]
+    known = [n * MILLIMETRES.get(u, PIXEL) for n, u in zip(numbers, units, strict=True) if n is not None]
+    real = len(known) == 2 and all(unit in MILLIMETRES for unit in units)
+    if len(box) == 4 and min(box[2:]) > 0:
+        if len(known) < 2:
+            known = [box[2] * PIXEL, box[3] * PIXEL]
+        mm = min(side / length for side, length in zip(known, box[2:], strict=True))
+        page: Page | None = Page(box[0], -(box[1] + box[3]), box[2], box[3])
     else:
-        return None
-    if not min(width, height) > 0:
-        return None
-    return Page(x + width / 2, -(y + height / 2), max(width, height))
+        page = Page(0, -known[1] / PIXEL, known[0] / PIXEL, known[1] / PIXEL) if len(known) == 2 else None
+        known, mm = known if len(known) == 2 else [1000 * PIXEL] * 2, PIXEL
+    return page, mm if real else None, (known[0] / PIXEL, known[1] / PIXEL)
 
 
-def _shapes(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Shape]:
-    """Closed shapes of an element and its children, transformed; names pass from groups to shapes."""
-    role = _role(element, role)
-    if isinstance(element, (svgelements.Group, svgelements.Use)):
-        for part in element:
-            yield from _shapes(part, role, matrix)
-    elif isinstance(element, DRAWN):
-        pieces = sorted(_pieces(element, role, matrix), key=lambda p: p.size, reverse=True)
-        for number, piece in enumerate(pieces):
-            # The other pieces of a path called outline are tethers within its largest piece.
-            yield replace(piece, role="tether") if number and role == "outline" else piece
+def _geometries(elements: list[Element], page: Page | None) -> list[Any]:
+    """Shapes in their own coordinates, as svgelements has them."""
+    width, height = (page.width, page.height) if page else (1000.0, 1000.0)
+    sheet = Element("svg", {"xmlns": NAMESPACE, "width": repr(width), "height": repr(height)})
+    for number, element in enumerate(elements):
+        kept = {k: v for k, v in element.attrib.items() if k in LENGTHS | {"d", "points"} and v.strip() != "auto"}
+        sheet.append(Element(tag_of(element), kept | {"id": str(number)}))
+    parsed = svgelements.SVG.parse(BytesIO(ElementTree.tostring(sheet)), reify=False)
+    found = {part.id: part for part in parsed.elements() if isinstance(part, DRAWN)}
+    return [found.get(str(number)) for number in range(len(elements))]
 
 
-def _role(element: Any, inherited: str) -> str:
-    """The role named by an element's id, class or Inkscape label, or else by its group's."""
-    values = element.values
-    for word in (element.id or "", *(values.get("class") or "").split(), values.get(LABEL) or ""):
-        for role, beginnings in (("outline", OUTLINE), ("tether", TETHER)):
-            if word.lower().startswith(beginnings):
-                return role
-    return inherited
-
-
-def _pieces(element: Any, role: str, matrix: svgelements.Matrix) -> Iterator[_Shape]:
-    """The pieces of a shape that enclose an area."""
-    path = abs(svgelements.Path(element) * matrix)
+def _pieces(drawn: Drawn, geometry: Any) -> Iterator[Shape | Line]:
+    """The pieces of a shape, in user units, y up: closed ones by size, and open ones."""
+    name, role = _name(drawn), role_of(*drawn.words)
+    if geometry is None:
+        return
+    (a, c, e), (b, d, f) = drawn.matrix
+    path = abs(svgelements.Path(geometry) * svgelements.Matrix(a, b, c, d, e, f))
+    _require_agreement(path, drawn, name)
+    if drawn.left < CUT:
+        return
+    shapes = []
     for piece in path.as_subpaths():
-        points = [point for segment in piece for point in _points(segment)]
-        if len({(point.x, point.y) for point in points}) < 3:
-            continue  # a straight line, or a point
-        polygon = shapely.Polygon([(point.x, point.y) for point in points])
-        if polygon.convex_hull.area == 0:
+        piece = svgelements.Path(piece)
+        corners = np.array([(point.x, -point.y) for segment in piece for point in _points(segment)])
+        corners = corners[np.append(True, np.any(np.diff(corners, axis=0), axis=1))] if len(corners) else corners
+        if len(corners) < 2:
             continue
-        if polygon.is_valid:
-            x0, y0, x1, y1 = polygon.bounds
-            polygon = polygon.simplify(SMOOTH * max(x1 - x0, y1 - y0))
-        yield _Shape(_name(element, polygon), role, polygon, _circle(element, piece))
+        span = float(np.ptp(corners, axis=0).max())
+        meets = float(np.hypot(*(corners[-1] - corners[0]))) <= SMOOTH * span
+        is_closed = isinstance(piece[-1], svgelements.Close) or drawn.filled or meets
+        polygon = shapely.Polygon(corners) if is_closed and len(corners) > 2 else None
+        if polygon is None or polygon.convex_hull.area == 0:
+            yield Line(name, corners, role)
+            continue
+        if polygon.is_valid and circle_of(polygon) is None:
+            polygon = polygon.simplify(SMOOTH * span)
+        shapes.append(Shape(name, polygon, role))
+    for number, shape in enumerate(sorted(shapes, key=lambda shape: -shape.size)):
+        if drawn.left < WHOLE:
+            raise RaptorError(f"{name} is cut by a clip or a mask; apply it, so that the shape ends where it is cut")
+        # What else a path called outline holds stands within its largest piece.
+        yield Shape(name, shape.polygon, "tether") if number and role == "outline" else shape
 
 
-def _name(element: Any, polygon: shapely.Polygon) -> str:
-    """A shape's name in messages: its id, or its kind and position in the drawing."""
-    if element.id:
-        return f"'{element.id}'"
-    x, y = polygon.centroid.x, polygon.centroid.y
-    return f"<{element.values.get('tag', 'shape')}> at ({x:.4g}, {-y:.4g})"
+def _require_agreement(path: Any, drawn: Drawn, name: str) -> None:
+    """Raise a RaptorError where the renderer draws a shape elsewhere than it was read."""
+    box = path.bbox()
+    if box is None:
+        return
+    read = np.array([box[0], box[1], box[2] - box[0], box[3] - box[1]])
+    if np.abs(read - drawn.box).max() > AGREED * max(drawn.box[2:].max(), read[2:].max()):
+        raise RaptorError(
+            f"{name} is drawn at {drawn.box.round(3).tolist()} (x, y, width, height) and written at "
+            f"{read.round(3).tolist()}; convert it to a path (in Inkscape: Path, Object to Path)"
+        )
+
+
+def _name(drawn: Drawn) -> str:
+    """What messages call a shape: its id, or its kind and where it lies in the drawing."""
+    if drawn.words[0] and not drawn.words[0].startswith("raptor-"):
+        return f"'{drawn.words[0]}'"
+    x, y = drawn.box[:2] + drawn.box[2:] / 2
+    return f"<{tag_of(drawn.element)}> at ({x:.4g}, {y:.4g})"
 
 
 def _points(segment: Any) -> list[Any]:
-    """Points along a segment of a path, without its start."""
+    """Points along a segment of a path, its start left out."""
     if isinstance(segment, (svgelements.CubicBezier, svgelements.QuadraticBezier, svgelements.Arc)):
         return [segment.point(t) for t in np.linspace(0, 1, CIRCLE_SEGMENTS + 1)[1:]]
     return [] if segment.end is None else [segment.end]
-
-
-def _circle(element: Any, piece: Any) -> Circle | None:
-    """The circle that a piece draws, if any."""
-    if not isinstance(element, (svgelements.Circle, svgelements.Ellipse)):
-        return None
-    arc = next(segment for segment in piece if isinstance(segment, svgelements.Arc))
-    if not isclose(arc.rx, arc.ry, rel_tol=1e-6):
-        return None
-    return Circle(float(arc.center.x), float(arc.center.y), float(arc.rx))
-
-
-def _told_apart(shapes: list[_Shape], where: str) -> tuple[_Shape, list[_Shape]]:
-    """The outline, and all other shapes as tethers."""
-    outlines = [shape for shape in shapes if shape.role == "outline"]
-    if len(outlines) > 1:
-        names = ", ".join(shape.name for shape in outlines)
-        raise RaptorError(
-            f"{where}: {len(outlines)} shapes are called outline ({names}); a mould is one connected "
-            "outline, so keep one and name the shapes in it tether"
-        )
-    candidates = outlines or [shape for shape in shapes if shape.role != "tether"]
-    if not candidates:
-        raise RaptorError(
-            f"{where} draws no outline; draw the depression as a closed path, polygon, rectangle, circle "
-            "or ellipse with the id 'outline'"
-        )
-    outline = max(candidates, key=lambda shape: shape.size)
-    return outline, [shape for shape in shapes if shape is not outline]

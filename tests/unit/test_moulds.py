@@ -111,10 +111,11 @@ def test_forbidden_depth_is_signed():
     ("geometry", "properties", "message"),
     [
         (polygon((-5, -5), (5, 5), (5, -5), (-5, 5)), {}, "not a simple polygon .*edges cross"),
-        (polygon((-40, -5), (5, -5), (5, 5)), {}, "outside the image; keep it within 31.25"),
+        (polygon((-4e9, -5), (5, -5), (5, 5)), {}, "a coordinate is beyond 1e"),
         (polygon((0, 0), (0, 0), (0, 0)), {}, "is empty"),
         ({"type": "MultiPolygon", "coordinates": [[], []]}, {}, "in 2 pieces"),
         ({"type": "Point", "coordinates": [0, 0]}, {}, "a Polygon is expected"),
+        ({"type": "Sphere", "coordinates": [0, 0]}, {}, "geometry is Sphere; a Polygon is expected"),
         (SQUARE, {"tethers": [{"x": 0, "y": 0, "radius": 8}]}, "reaches out of the depression"),
         (
             SQUARE,

@@ -67,6 +67,57 @@ def read_input(path: Path, what: str, expected: str) -> bytes:
     return content
 
 
+SIGNATURES = {
+    b"\x89PNG": "a PNG picture", b"\xff\xd8\xff": "a JPEG picture", b"II*\0": "a TIFF picture",
+    b"MM\0*": "a TIFF picture", b"GIF8": "a GIF picture", b"BM": "a BMP picture", b"RIFF": "a WebP picture",
+    b"8BPS": "a Photoshop document", b"%PDF": "PDF", b"%!PS": "PostScript", b"AC10": "a DWG drawing",
+    b"PK\3\4": "a ZIP archive or an Office document", b"\x1f\x8b": "a gzip archive", b"\x89HDF": "HDF5 or netCDF",
+    b"CDF": "netCDF", b"ZISRAWFILE": "a Zeiss CZI picture", b"\xda\xce\xbe\x0a": "a Nikon ND2 picture",
+    b"p\0\0\0": "a Leica LIF picture", b"{": "JSON", b"<svg": "SVG", b"<!DOCTYPE html": "HTML", b"<html": "HTML",
+    b"<?xml": "XML",
+}  # fmt: skip
+MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+"""Encodings by the mark that a text begins with."""
+
+
+def kind_of(content: bytes) -> str:
+    """What a file's content looks like, as a verb and an object."""
+    if content[4:8] == b"ftyp":
+        return "looks like HEIC, AVIF or a video"
+    start = content.lstrip()
+    if start.startswith(b"<?xml") and b"<svg" in content[:4000]:
+        return "looks like SVG"
+    for signature, kind in SIGNATURES.items():
+        if content.startswith(signature) or start.startswith(signature):
+            return f"looks like {kind}"
+    return "looks like none that is known"
+
+
+def read_text(path: Path, what: str, expected: str) -> str:
+    """Text of a file that a user gives, in UTF-8, or in UTF-16 or UTF-8 with a mark; otherwise as `read_input`.
+
+    Raises
+    ------
+    RaptorError
+        As `read_input`, and where the text has another encoding.
+    """
+    return decoded(read_input(path, what, expected), f"{what} {path}")
+
+
+def decoded(content: bytes, where: str) -> str:
+    """Bytes as text, without the mark that some programs put before it; raises where it is not UTF-8."""
+    encoding = next((name for mark, name in MARKS.items() if content.startswith(mark)), "utf-8")
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        likely = content[error.start : error.start + 1].decode("latin-1")
+        raise RaptorError(
+            f"{where} is not UTF-8 text: line {line} holds the byte 0x{content[error.start]:02x} ('{likely}' in "
+            "Latin-1 or Windows-1252); save it again with the encoding UTF-8"
+        ) from error
+
+
 def _is_full(folder: Path) -> bool:
     """Whether the disk is full; libraries such as HDF5 do not report it."""
     try:

@@ -1,24 +1,21 @@
-"""Moulds painted as PNG: white is outside, black or grey the depression, red a tether (docs/moulds.md).
+"""Moulds painted as pictures: white is outside, black or grey the depression, red a tether (docs/moulds.md).
 
 Walls run where a pixel would be half of one colour and half of the other, so soft (anti-aliased) edges give
 sub-pixel precision. White spots within the depression are tethers too.
 """
 
-import struct
-import zlib
-from io import BytesIO
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image
 from skimage.measure import find_contours
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import read_input
-from raptor.moulds.drawing import Drawing, Page
-from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
+from raptor.core.pixels import read_pixels
+from raptor.moulds.drawing import Drawing, Page, Shape
+from raptor.moulds.geometry import Circle
 
 WHITE = 0.9  # lightness, out of 1, from which a pixel is outside
 TINT = 0.3  # largest difference of green and blue, or excess over red, out of 1
@@ -26,52 +23,31 @@ RED = 0.25  # least excess of red over green and blue in a tether, out of 1
 TOLERANCE = 0.5  # pixels; largest distance of a simplified wall from the contour
 BLUR = 1.0  # pixels; precision to which drawing programs place a wall
 MOST_PIXELS = 4096  # along a side
-# Pillow reports damage by many kinds of exceptions.
-DAMAGE = (
-    OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError,
-)  # fmt: skip
 
 
-def read_bitmap(path: Path, scale: float | None = None) -> Mould:
-    """Read a PNG file that holds one mould; `scale` is l0 per pixel.
+def read_bitmap(path: Path, page: int | None = None) -> Drawing:
+    """Read a picture (PNG, TIFF, JPEG, ...) that shows one mould; pages count from 1.
 
     Raises
     ------
     RaptorError
-        If the file is not PNG, shows no depression or several, or the mould cannot be cast.
+        Where the file is no picture, or shows no depression or several.
     """
     path = Path(path)
     where = f"mould file {path}"
-    colours = _colours(read_input(path, "mould file", "a PNG picture"), where)
+    colours = read_pixels(path, "mould file", page).on_white
     rows, columns = colours.shape[:2]
-    outline, tethers = _walls(colours, where)
-    page = Page((columns - 1) / 2, -(rows - 1) / 2, max(rows, columns))
-    return Drawing(outline, tuple(tethers), page, "pixel", BLUR).mould(path, scale)
+    if max(rows, columns) > MOST_PIXELS:
+        raise RaptorError(
+            f"{where} is {columns} x {rows} pixels large; make it at most {MOST_PIXELS} a side (1,000 are plenty)"
+        )
+    sheet, walls = Page(-0.5, 0.5 - rows, columns, rows), tuple(_walls(colours, where))
+    # A square picture is the frame, as it is for photographs that are aligned with the mould.
+    return Drawing(walls, (), sheet, "pixel", framed=rows == columns, blur=BLUR)
 
 
-def _colours(content: bytes, where: str) -> NDArray[np.float64]:
-    """Red, green and blue of a picture (row, column, 3), 0 to 1, on a white background."""
-    try:
-        picture = Image.open(BytesIO(content), formats=["PNG"])
-        if max(picture.size) > MOST_PIXELS:
-            raise RaptorError(
-                f"{where} is {picture.width} x {picture.height} pixels; reduce it to at most "
-                f"{MOST_PIXELS} per side (1,000 are enough)"
-            )
-        if picture.mode.startswith("I"):  # 16-bit grey
-            grey = np.asarray(picture, dtype=np.float64) / 65535
-            return np.repeat(grey[..., None], 3, axis=2)
-        layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
-    except RaptorError:
-        raise
-    except DAMAGE as error:
-        raise RaptorError(f"{where} is not PNG, or is truncated: {error}; save it again as PNG") from error
-    opacity = layers[..., 3:]
-    return np.asarray(layers[..., :3] * opacity + 1 - opacity)
-
-
-def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, list[tuple[str, Tether]]]:
-    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their positions."""
+def _walls(colours: NDArray[np.float64], where: str) -> Iterator[Shape]:
+    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their places."""
     _require_known(colours, where)
     light, redness = colours.min(axis=2), colours[..., 0] - colours[..., 1:].max(axis=2)
     grey = light[(light < WHITE) & (redness < RED)]
@@ -97,7 +73,9 @@ def _walls(colours: NDArray[np.float64], where: str) -> tuple[shapely.Polygon, l
         )
     outline = shapely.Polygon(bodies[0].exterior).simplify(TOLERANCE)
     holes = [shapely.Polygon(ring) for ring in bodies[0].interiors]
-    return outline, [(f"the tether at {_place(part)}", _tether(part, outline)) for part in [*red, *holes]]
+    yield Shape("of the depression", outline, "outline")
+    for part in [*red, *holes]:
+        yield Shape(f"at {_place(part)}", _tether(part, outline), "tether")
 
 
 def _require_known(colours: NDArray[np.float64], where: str) -> None:
@@ -120,17 +98,17 @@ def _regions(field: NDArray[np.float64]) -> list[shapely.Polygon]:
     return list(shapely.get_parts(shapely.build_area(shapely.MultiLineString(lines))))
 
 
-def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> Tether:
-    """A painted region as a tether: a circle if it is round to half a pixel."""
+def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> shapely.Polygon:
+    """The wall of a painted region: a circle where it is round to half a pixel."""
     centre, radius = part.centroid, float(np.sqrt(part.area / np.pi))
     corners = shapely.get_coordinates(part)
     post = Circle(centre.x, centre.y, radius)
     reach = np.hypot(corners[:, 0] - centre.x, corners[:, 1] - centre.y)
     if np.abs(reach - radius).max() < TOLERANCE and post.stands_in(outline):
-        return post
+        return post.polygon
     simple = part.simplify(TOLERANCE)
-    inside = simple.intersection(outline)  # simplification must not push a tether out through the wall
-    return PolygonTether(inside if inside.geom_type == "Polygon" and not inside.is_empty else simple)
+    inside = simple.intersection(outline)  # a tether at the wall must not reach out by the tolerance
+    return inside if inside.geom_type == "Polygon" and not inside.is_empty else simple
 
 
 def _place(part: shapely.Polygon) -> str:

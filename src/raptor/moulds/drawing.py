@@ -41,6 +41,21 @@ class Page:
     width: float
     height: float
 
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Its middle."""
+        return self.x + self.width / 2, self.y + self.height / 2
+
+    @property
+    def is_frame(self) -> bool:
+        """Whether it is a square of 62.5 units: drawn in l0."""
+        return bool(np.allclose((self.width, self.height), IMAGE_SIZE, rtol=1e-6))
+
+    def covers(self, shape: shapely.Geometry) -> bool:
+        """Whether a shape lies on it."""
+        sheet = shapely.box(self.x, self.y, self.x + self.width, self.y + self.height)
+        return bool(sheet.buffer(1e-6 * self.width).covers(shape.envelope))
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -86,6 +101,8 @@ class Drawing:
         Millimetres a unit, where the file has a real unit.
     l0 : float or None
         l0 a unit, where the file says so.
+    framed : bool
+        Whether the page, a square, is drawn as the frame.
     blur : float
         How finely the drawing tells where a wall is, drawing units. A corner nearer than this to a row of
         sites is put on it, so that noise does not decide about a whole row.
@@ -97,14 +114,15 @@ class Drawing:
     unit: str = "user unit"
     mm: float | None = None
     l0: float | None = None
+    framed: bool = False
     blur: float = 0.0
 
     def mould(self, path: Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
         """The mould drawn in the file `path`, lengths in l0.
 
         The middle of the outline's bounding box is the origin. Without a scale (l0 a drawing unit, or
-        millimetres an l0) the outline's longest side becomes 52 l0; but where the page is a square of 62.5
-        units, it is the frame.
+        millimetres an l0) the page is the frame where it is drawn as that, and otherwise the outline's longest
+        side becomes 52 l0.
 
         Raises
         ------
@@ -134,7 +152,8 @@ class Drawing:
         everything = np.concatenate(corners) if corners else np.zeros((0, 2))
         if everything.size and not np.abs(everything).max() < FARTHEST:
             raise RaptorError(f"a coordinate is beyond {FARTHEST:g}, or is no number; look at its corners")
-        closed, longest = list(self.shapes), float(np.ptp(everything, axis=0).max(initial=0.0))
+        closed = list(self.shapes)
+        longest = float(np.ptp(everything, axis=0).max()) if everything.size else 0.0
         if self.lines:
             closed += joined(self.lines, GAP * longest)
             _require_closed(self.lines, closed, longest)
@@ -156,9 +175,8 @@ class Drawing:
             scale, named = self.mm / mm_per_l0, "mm-per-l0"
         if scale is None:
             scale = self.l0
-        if scale is None and self._is_on_frame(outline):
-            assert self.page is not None
-            middle, scale = (self.page.x + IMAGE_SIZE / 2, self.page.y + IMAGE_SIZE / 2), 1.0
+        if scale is None and self.framed and self.page is not None and self.page.covers(outline.polygon):
+            middle, scale = self.page.centre, IMAGE_SIZE / self.page.width
         fitted = scale is None
         scale = FITTED / longest if scale is None else scale
         if mm_per_l0 is None and self.mm is not None:
@@ -167,24 +185,20 @@ class Drawing:
         if not 1 <= longest * scale <= IMAGE_SIZE * (1 + 1e-6):
             raise RaptorError(
                 f"the outline is {width * scale:.4g} x {height * scale:.4g} l0 at {scale:.4g} l0 a "
-                f"{self.unit}, and the frame is {IMAGE_SIZE} l0 wide; {self._advice(named, longest)}"
+                f"{self.unit}, and the frame is {IMAGE_SIZE} l0 wide; {self._advice(named, longest, scale)}"
             )
         return made
 
-    def _is_on_frame(self, outline: Shape) -> bool:
-        """Whether the page is a square of 62.5 units, and the outline lies on it."""
-        if self.page is None or not np.allclose((self.page.width, self.page.height), IMAGE_SIZE, rtol=1e-6):
-            return False
-        sheet = shapely.box(self.page.x, self.page.y, self.page.x + IMAGE_SIZE, self.page.y + IMAGE_SIZE)
-        return bool(sheet.buffer(10.0**-DIGITS).covers(outline.polygon.envelope))
-
-    def _advice(self, named: str, longest: float) -> str:
+    def _advice(self, named: str, longest: float, scale: float) -> str:
         """The scale that fits an outline whose longest side is given in drawing units."""
+        small = longest * scale < 1
         if named == "mm-per-l0" and self.mm is not None:
-            smallest = rounded(self.mm * longest / IMAGE_SIZE, up=True)
-            return f"give --mm-per-l0 {smallest} or more ({rounded(self.mm * longest / FITTED, up=True)} fits)"
-        largest = rounded(IMAGE_SIZE / longest)
-        return f"give a scale of {largest} or less (--scale {rounded(FITTED / longest)} fits)"
+            fits = f"--mm-per-l0 {rounded(self.mm * longest / FITTED, up=True)}"
+            limit = rounded(self.mm * longest / (1 if small else IMAGE_SIZE), up=not small)
+            return f"give --mm-per-l0 of {limit} or {'less' if small else 'more'} ({fits} fits)"
+        limit = rounded((1 if small else IMAGE_SIZE) / longest, up=small)
+        side = "more" if small else "less"
+        return f"give a scale of {limit} or {side} (--scale {rounded(FITTED / longest)} fits)"
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import Any
 import shapely
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path, read_input
+from raptor.core.files import atomic_path, read_text
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
-PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area")
+PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area", "mm_per_l0")
 
 
 def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
@@ -25,51 +25,50 @@ def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
         If the file is missing, empty or not GeoJSON, or a mould in it cannot be cast.
     """
     path = Path(path)
-    text = read_input(path, "mould file", "a GeoJSON polygon").decode("utf-8", errors="replace")
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise RaptorError(f"mould file {path} is not GeoJSON: {error}") from error
-    kind = document.get("type") if isinstance(document, dict) else None
-    if kind == "FeatureCollection":
-        features = document.get("features") or []
-    elif kind == "Feature":
-        features = [document]
-    elif kind == "Polygon":
-        features = [{"geometry": document, "properties": {}}]
-    else:
-        raise RaptorError(
-            f"mould file {path} holds {kind or 'no GeoJSON type'}; a Feature, a FeatureCollection "
-            "or a Polygon is expected"
-        )
-    if not features:
-        raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
+    features = read_features(path)
     try:
         return [from_feature(f, path) for f in features if only is None or _name(f, path) in only]
     except (AttributeError, TypeError, KeyError, IndexError) as error:
         raise RaptorError(f"mould file {path} is not GeoJSON of a mould: {error}") from error
 
 
-def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mould]:
-    """The moulds of `read_moulds` by id; raises the same errors."""
-    return {mould.name: mould for mould in read_moulds(path, only)}
-
-
-def read_geojson(path: Path) -> Mould:
-    """Read a GeoJSON file that holds one mould.
+def read_features(path: Path) -> list[dict[str, Any]]:
+    """The features of a GeoJSON file; a bare geometry is one.
 
     Raises
     ------
     RaptorError
-        As `read_moulds`, and if the file holds more than one feature.
+        Where the file is missing, empty or not GeoJSON, or holds no feature.
     """
-    moulds = read_moulds(path)
-    if len(moulds) > 1:
+    path = Path(path)
+    text = read_text(path, "mould file", "a GeoJSON polygon")
+    try:
+        document = json.loads(text)
+    except RecursionError:
+        raise RaptorError(f"mould file {path} is nested too deeply; a mould is a Polygon or a few") from None
+    except ValueError as error:  # not JSON, or a number of thousands of digits
+        raise RaptorError(f"mould file {path} is not GeoJSON: {error}") from error
+    kind = document.get("type") if isinstance(document, dict) else None
+    features: list[Any] = []
+    if kind == "FeatureCollection":
+        features = document.get("features") or []
+    elif kind == "Feature":
+        features = [document]
+    elif kind in ("Polygon", "MultiPolygon", "GeometryCollection"):
+        features = [{"geometry": document, "properties": {}}]
+    else:
         raise RaptorError(
-            f"mould file {path} gives the depression in {len(moulds)} pieces; a mould is one "
-            "connected outline, so keep one feature"
+            f"mould file {path} holds {kind or 'no GeoJSON type'}; a Feature, a FeatureCollection "
+            "or a Polygon is expected"
         )
-    return moulds[0]
+    if not features or not all(isinstance(feature, dict) for feature in features):
+        raise RaptorError(f"mould file {path} holds no mould; one feature with a Polygon is expected")
+    return features
+
+
+def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mould]:
+    """The moulds that `read_moulds` reads, by id; raises as it does."""
+    return {mould.name: mould for mould in read_moulds(path, only)}
 
 
 def write_moulds(path: Path, moulds: Iterable[Mould]) -> None:
@@ -109,30 +108,46 @@ def from_feature(feature: dict[str, Any], path: Path = Path("GeoJSON")) -> Mould
     elif geometry.get("type") != "Polygon":
         raise RaptorError(f"{where}: geometry is {geometry.get('type')}; a Polygon is expected")
     _require_known(properties, where)
-    rings = [_polygon(ring, f"{where}: the outline") for ring in parts or [[]]]
+    rings = [polygon_of(ring, f"{where}: the outline") for ring in parts or [[]]]
     outline = shapely.Polygon(rings[0].exterior, [hole.exterior for hole in rings[1:]])
-    tethers = tuple(
-        _tether(entry, f"{where}: tether {number}")
-        for number, entry in enumerate(properties.get("tethers") or [], start=1)
-    )
+    tethers = tethers_of(properties, where)
     symmetry = str(properties.get("symmetry", "unknown"))
     try:
-        return Mould(outline, tethers, symmetry, name)
+        return Mould(outline, tethers, symmetry, name, properties.get("mm_per_l0"))
     except RaptorError as error:
         raise RaptorError(f"mould file {path}: {error}") from error
+
+
+def tethers_of(properties: dict[str, Any], where: str) -> tuple[Tether, ...]:
+    """The tethers among a feature's properties, which GDAL writes as text.
+
+    Raises
+    ------
+    RaptorError
+        Where one is neither a circle nor a polygon.
+    """
+    entries = properties.get("tethers") or []
+    if isinstance(entries, str):
+        try:
+            entries = json.loads(entries)
+        except ValueError as error:
+            raise RaptorError(f"{where}: its tethers are no list: {error}") from error
+    if not isinstance(entries, list):
+        raise RaptorError(f"{where}: its tethers are no list")
+    return tuple(_tether(entry, f"{where}: tether {n}") for n, entry in enumerate(entries, start=1))
 
 
 def _require_known(properties: dict[str, Any], where: str) -> None:
     """Raise a RaptorError for a misspelt property; properties of other programs are ignored."""
     for key in set(properties) - set(PROPERTIES):
         near = get_close_matches(key.lower(), PROPERTIES, 1, 0.8)
-        if near:
+        if near and near[0] != key.lower():
             raise RaptorError(f"{where}: unknown property '{key}'; did you mean '{near[0]}'?")
 
 
 def _tether(entry: Any, what: str) -> Tether:
     if isinstance(entry, dict) and set(entry) == {"polygon"}:
-        return PolygonTether(_polygon(entry["polygon"], what))
+        return PolygonTether(polygon_of(entry["polygon"], what))
     if isinstance(entry, dict) and set(entry) == {"x", "y", "radius"}:
         try:
             values = [float(entry[key]) for key in ("x", "y", "radius")]
@@ -144,7 +159,14 @@ def _tether(entry: Any, what: str) -> Tether:
     raise RaptorError(f'{what} must be {{"x", "y", "radius"}} or {{"polygon": [[x, y], ...]}}')
 
 
-def _polygon(ring: Any, what: str) -> shapely.Polygon:
+def polygon_of(ring: Any, what: str) -> shapely.Polygon:
+    """A polygon from [x, y, ...] corners; messages call it `what`.
+
+    Raises
+    ------
+    RaptorError
+        Where it has less than three corners, or one is not finite.
+    """
     try:
         if len(ring) < 3:
             raise ValueError("at least three corners are needed")

@@ -1,4 +1,4 @@
-"""One door for moulds: a name of the library, or a GeoJSON, SVG or PNG file (docs/moulds.md)."""
+"""One door for moulds: a name of the library, or a file: GeoJSON, SVG, DXF or a picture (docs/moulds.md)."""
 
 from difflib import get_close_matches
 from math import isfinite
@@ -6,11 +6,11 @@ from pathlib import Path
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input
-from raptor.moulds.geojson import read_geojson
+from raptor.core.pixels import SUFFIXES as PICTURES
 from raptor.moulds.geometry import Mould
 from raptor.moulds.library import MOULDS
 
-SUFFIXES = (".geojson", ".json", ".svg", ".png")
+SUFFIXES = (".geojson", ".json", ".svg", ".svgz", ".dxf", *PICTURES)
 """Suffixes of the files that `read_mould` reads."""
 
 
@@ -49,17 +49,25 @@ def as_mould(mould: Mould | str | Path) -> Mould:
     )
 
 
-def read_mould(path: str | Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
+def read_mould(
+    path: str | Path, scale: float | None = None, mm_per_l0: float | None = None, page: int | None = None
+) -> Mould:
     """Read a mould of the library, or a file that holds one mould.
+
+    Without `scale` a drawing is fitted to the frame: its longest side becomes 52 l0. But a GeoJSON that lies
+    within the frame, and an SVG whose page is a square of 62.5 user units, are in l0 already.
 
     Parameters
     ----------
     path : str or Path
-        Name of a standard mould, or a file: GeoJSON (.geojson, .json), SVG (.svg) or PNG (.png).
+        Name of a standard mould, or a file: GeoJSON, SVG, DXF, or a picture (PNG, TIFF, JPEG, ...).
     scale : float, optional
-        l0 a unit of the file: of a GeoJSON coordinate (1 where not given), of an SVG user unit, or of a
-        pixel. A drawing with a scale is put in the middle of the frame; without one, its page is the frame
-        of 62.5 l0.
+        l0 a unit of the file: of a coordinate, of an SVG user unit, or of a pixel.
+    mm_per_l0 : float, optional
+        Millimetres an l0. It sets the scale of a file that has a real unit (mm, cm, in, pt) where `scale` does
+        not; otherwise it only says how long an l0 is.
+    page : int, optional
+        Page of a picture that has several, from 1.
 
     Raises
     ------
@@ -67,22 +75,26 @@ def read_mould(path: str | Path, scale: float | None = None, mm_per_l0: float | 
         Where the file is missing, unreadable, of another kind, or holds no mould that can be cast.
     """
     path = find_mould(path)
-    if scale is not None and not (isfinite(scale) and scale > 0):
-        raise RaptorError(f"scale is {scale}; give a positive number of l0 a unit of {path.name}")
+    for name, value in (("scale", scale), ("mm_per_l0", mm_per_l0)):
+        if value is not None and not (isfinite(value) and value > 0):
+            raise RaptorError(f"{name} is {value}; give a positive number (of {path.name})")
     suffix = path.suffix.lower()
     # Imported here: a simulation job reads GeoJSON, and need not load what reads drawings.
-    if suffix == ".svg":
-        from raptor.moulds.svg import read_svg
-
-        return read_svg(path).mould(path, scale, mm_per_l0)
-    if suffix == ".png":
+    if suffix in (".svg", ".svgz"):
+        from raptor.moulds.svg import read_svg as read
+    elif suffix == ".dxf":
+        from raptor.moulds.dxf import read_dxf as read
+    elif suffix in PICTURES:
         from raptor.moulds.bitmap import read_bitmap
 
-        return read_bitmap(path, scale)
-    if suffix in SUFFIXES:
-        mould = read_geojson(path)
-        return mould if scale is None else mould.scaled(scale)
-    read_input(path, "mould file", "a mould")  # a missing file is called missing, whatever its suffix
-    raise RaptorError(
-        f"mould file {path} has the suffix '{path.suffix}'; a mould is read from {', '.join(SUFFIXES)}"
-    )
+        return read_bitmap(path, page).mould(path, scale, mm_per_l0)
+    elif suffix in SUFFIXES:
+        from raptor.moulds.features import read_geojson
+
+        return read_geojson(path, scale, mm_per_l0)
+    else:
+        read_input(path, "mould file", "a mould")  # a missing file is called missing, whatever its suffix
+        raise RaptorError(
+            f"mould file {path} has the suffix '{path.suffix}'; a mould is read from {', '.join(SUFFIXES)}"
+        )
+    return read(path).mould(path, scale, mm_per_l0)

@@ -133,7 +133,7 @@ def _prepared(root: Element, page: tuple[float, float]) -> Element:
             element.set(NAME, name or "")
             element.set("id", name := f"raptor-{number}")
         taken.add(name or "")
-    document.append(Element(f"{SVG}rect", {"id": FRAME, "style": APPARENT}))
+    document.append(Element(f"{SVG}rect", {"id": FRAME, "style": APPARENT, "width": "1", "height": "1"}))
     return document
 
 

@@ -66,7 +66,8 @@ def read_svg(path: Path) -> Drawing:
         raise RaptorError(f"{where}: {error}") from error
     except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError) as error:
         raise RaptorError(f"{where} cannot be read: {error}; save it again as plain SVG") from error
-    return Drawing(tuple(shapes), tuple(lines), page, mm=mm, l0=_scale(root, where))
+    framed = page is not None and page.is_frame
+    return Drawing(tuple(shapes), tuple(lines), page, mm=mm, l0=_scale(root, where), framed=framed)
 
 
 def _root(content: bytes, where: str) -> Element:

@@ -1,0 +1,101 @@
+"""Moulds from CAD drawings: what the model space of a DXF file shows, by ezdxf (docs/moulds.md).
+
+Closed polylines, circles, ellipses and splines are shapes; lines and arcs count where they close one
+together. Layers that are off or frozen, layers that are not printed, text, dimensions and points do not
+count. The name of a layer or block tells outline and tethers apart, as an SVG group's does.
+"""
+
+import logging
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import shapely
+from ezdxf import path as paths
+from ezdxf import recover, units
+from ezdxf.addons.drawing.properties import RenderContext
+from ezdxf.disassemble import recursive_decompose
+from ezdxf.document import Drawing as Document
+from ezdxf.entities import DXFGraphic, Insert
+
+from raptor.core.errors import RaptorError
+from raptor.core.files import kind_of, read_input
+from raptor.moulds.drawing import Drawing, Line, Shape, role_of
+
+DRAWN = {"LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE", "SOLID", "TRACE", "3DFACE"}
+FLAT = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
+MOST_SHAPES = 20_000
+
+
+def read_dxf(path: Path) -> Drawing:
+    """Read a DXF file that holds one mould; a real unit is taken from its header ($INSUNITS).
+
+    Raises
+    ------
+    RaptorError
+        Where the file is not DXF, or draws too much.
+    """
+    path = Path(path)
+    where = f"mould file {path}"
+    document = _document(read_input(path, "mould file", "a DXF drawing"), where)
+    shapes: list[Shape] = []
+    lines: list[Line] = []
+    for number, piece in enumerate(_pieces(document)):
+        if number >= MOST_SHAPES:
+            raise RaptorError(f"{where} draws more than {MOST_SHAPES} lines; keep the outline and the tethers")
+        (shapes if isinstance(piece, Shape) else lines).append(piece)  # type: ignore[arg-type]
+    unit = document.units
+    mm = float(units.conversion_factor(unit, units.MM)) if unit else None
+    return Drawing(tuple(shapes), tuple(lines), unit="drawing unit", mm=mm)
+
+
+def _document(content: bytes, where: str) -> Document:
+    """A DXF document, repaired where that can be done."""
+    logging.getLogger("ezdxf").setLevel(logging.ERROR)
+    try:
+        document, auditor = recover.read(BytesIO(content))
+    except (ezdxf.DXFError, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+        raise RaptorError(
+            f"{where} is not DXF, or is cut short: its content {kind_of(content)} ({error}); save it again as DXF "
+            "(AutoCAD 2000 or later)"
+        ) from error
+    if auditor.has_errors:
+        first = auditor.errors[0].message
+        raise RaptorError(f"{where} is damaged: {first}; save it again as DXF")
+    return document
+
+
+def _pieces(document: Document) -> Iterator[Shape | Line]:
+    """What the model space draws, y up, drawing units."""
+    context = RenderContext(document)
+    for outer in document.modelspace():
+        if not isinstance(outer, DXFGraphic) or outer.dxftype() == "DIMENSION":
+            continue
+        named = [outer.dxf.get("layer", ""), outer.dxf.get("name", "") if isinstance(outer, Insert) else ""]
+        for entity in recursive_decompose([outer]):
+            kind = entity.dxftype()
+            if kind not in DRAWN or not context.resolve_visible(entity):
+                continue
+            layer = entity.dxf.get("layer", "0")
+            if not context.resolve_layer_properties(layer).plot:
+                continue
+            yield from _traced(entity, f"{kind} {entity.dxf.get('handle') or 'in ' + named[1]} on layer '{layer}'", role_of(layer, *named))
+
+
+def _traced(entity: DXFGraphic, name: str, role: str) -> Iterator[Shape | Line]:
+    """An entity as closed and open lines."""
+    for path in paths.make_path(entity).sub_paths() if paths.has_path_support(entity) else ():
+        box = paths.bbox([path], fast=True)
+        span = max(box.size.x, box.size.y) if box.has_data else 0.0
+        if not span > 0:
+            continue
+        corners = np.array([(point.x, point.y) for point in path.flattening(FLAT * span, segments=16)])
+        corners = corners[np.append(True, np.any(np.diff(corners, axis=0), axis=1))]
+        closed = path.is_closed or float(np.hypot(*(corners[-1] - corners[0]))) <= FLAT * span
+        polygon = shapely.Polygon(corners) if closed and len(corners) > 2 else None
+        if polygon is not None and polygon.convex_hull.area > 0:
+            yield Shape(name, polygon, role)
+        elif len(corners) > 1:
+            yield Line(name, corners, role)

@@ -256,10 +256,10 @@ def test_pictures_that_cannot_be_read(tmp_path):
     io.imsave(stack, np.zeros((5, 64, 64), np.uint8), check_contrast=False)
     for path, message in (
         (tmp_path / "none.png", "none.png does not exist"),
-        (text, "is not an image that can be read"),
+        (text, "is no picture that can be read: its content looks like none that is known"),
         (tiny, "is 8 x 8 pixels; at least 32 are needed"),
         (flat, "has the same value everywhere"),
-        (stack, "give one picture, not a stack"),
+        (stack, "holds 5 pages .time points, slices or channels.; give --page 1 to 5"),
     ):
         with pytest.raises(RaptorError, match=message):
             read_picture(path)

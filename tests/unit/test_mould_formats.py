@@ -309,7 +309,7 @@ def test_a_file_that_is_no_png(tmp_path):
     path = tmp_path / "bad.png"
     for content in (b"hello", whole[:1000], whole[:20], svg(BOX).encode()):
         path.write_bytes(content)
-        with pytest.raises(RaptorError, match="is no picture that can be read|is cut short"):
+        with pytest.raises(RaptorError, match=r"is no picture that can be read|is truncated"):
             read_mould(path)
 
 

@@ -71,10 +71,11 @@ SIGNATURES = {
     b"\x89PNG": "a PNG picture", b"\xff\xd8\xff": "a JPEG picture", b"II*\0": "a TIFF picture",
     b"MM\0*": "a TIFF picture", b"GIF8": "a GIF picture", b"BM": "a BMP picture", b"RIFF": "a WebP picture",
     b"8BPS": "a Photoshop document", b"%PDF": "PDF", b"%!PS": "PostScript", b"AC10": "a DWG drawing",
-    b"PK\3\4": "a ZIP archive or an Office document", b"\x1f\x8b": "a gzip archive", b"\x89HDF": "HDF5 or netCDF",
-    b"CDF": "netCDF", b"ZISRAWFILE": "a Zeiss CZI picture", b"\xda\xce\xbe\x0a": "a Nikon ND2 picture",
-    b"p\0\0\0": "a Leica LIF picture", b"{": "JSON", b"<svg": "SVG", b"<!DOCTYPE html": "HTML", b"<html": "HTML",
-    b"<?xml": "XML",
+    b"PK\3\4": "a ZIP archive or an Office document", b"\x1f\x8b": "a gzip archive", b"CDF": "netCDF",
+    b"\x89HDF": "HDF5 or netCDF", b"ZISRAWFILE": "a Zeiss CZI picture",
+    b"\xda\xce\xbe\x0a": "a Nikon ND2 file",
+    b"p\0\0\0": "a Leica LIF picture", b"{": "JSON", b"<svg": "SVG", b"<?xml": "XML",
+    b"<!DOCTYPE html": "HTML", b"<html": "HTML",
 }  # fmt: skip
 MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 """Encodings by the mark that a text begins with."""
@@ -94,7 +95,7 @@ def kind_of(content: bytes) -> str:
 
 
 def read_text(path: Path, what: str, expected: str) -> str:
-    """Text of a file that a user gives, in UTF-8, or in UTF-16 or UTF-8 with a mark; otherwise as `read_input`.
+    """Text of a file that a user gives, in UTF-8, or with a mark in UTF-16; otherwise as `read_input`.
 
     Raises
     ------
@@ -113,8 +114,8 @@ def decoded(content: bytes, where: str) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         likely = content[error.start : error.start + 1].decode("latin-1")
         raise RaptorError(
-            f"{where} is not UTF-8 text: line {line} holds the byte 0x{content[error.start]:02x} ('{likely}' in "
-            "Latin-1 or Windows-1252); save it again with the encoding UTF-8"
+            f"{where} is not UTF-8 text: line {line} holds the byte 0x{content[error.start]:02x} ('{likely}' "
+            "in Latin-1 or Windows-1252); save it again with the encoding UTF-8"
         ) from error
 
 

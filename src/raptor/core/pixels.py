@@ -1,4 +1,4 @@
-"""Pixels of a picture of any common format, as a viewer shows them: turned, in colours, one page at a time."""
+"""Pixels of a picture of any common format, as a viewer shows them: turned, in colours, page by page."""
 
 import struct
 import warnings
@@ -17,8 +17,6 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
 
 MOST_PIXELS = 150_000_000  # of one page
-SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".webp")
-"""Suffixes of common pictures; what is read is told by the content."""
 # Pillow and tifffile tell of damage by exceptions of many kinds.
 DAMAGE = (
     OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError, AttributeError, RuntimeError,
@@ -66,7 +64,7 @@ def read_pixels(path: Path, what: str = "picture", page: int | None = None) -> P
     Raises
     ------
     RaptorError
-        Where the file is missing or no picture, has several pages and none is chosen, or is too large.
+        If the file is missing or no picture, has several pages and none is chosen, or is too large.
     """
     path = Path(path)
     content = read_input(path, what, "a picture")
@@ -80,12 +78,12 @@ def read_pixels(path: Path, what: str = "picture", page: int | None = None) -> P
         raise
     except UnidentifiedImageError as error:
         raise RaptorError(
-            f"{where} is no picture that can be read: its content {kind_of(content)}; save it as PNG, TIFF or "
-            "JPEG"
+            f"{where} is no picture that can be read: its content {kind_of(content)}; save it as PNG, TIFF "
+            "or JPEG"
         ) from error
     except DAMAGE as error:
         raise RaptorError(
-            f"{where} is cut short or damaged: {error or type(error).__name__}; save it again"
+            f"{where} is truncated or damaged: {error or type(error).__name__}; save it again"
         ) from error
     except Image.DecompressionBombError as error:
         raise RaptorError(f"{where} is too large: {error}; reduce it") from error
@@ -117,7 +115,7 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
 
 def _tiff(content: bytes, where: str, page: int | None) -> Pixels:
     """A page of a TIFF file; time points, slices and channels count as pages."""
-    import tifffile  # here, since most moulds and masks are no TIFF
+    import tifffile  # slow to load, and most pictures are no TIFF
 
     with tifffile.TiffFile(BytesIO(content)) as file:
         planes = [
@@ -136,7 +134,7 @@ def _tiff(content: bytes, where: str, page: int | None) -> Pixels:
         order = [axes.index(axis) for axis in axes if axis not in "YXS"]
         order += [axes.index(axis) for axis in "YXS" if axis in axes]
         values = values.transpose(order).reshape(-1, shape["Y"], shape["X"], shape.get("S", 1))[number]
-        kind, table = key.photometric.name, key.colormap
+        kind, table = str(getattr(key.photometric, "name", "")), key.colormap
         tag = key.tags.get("Orientation")
         turn = TURNS.get(int(tag.value) if tag is not None else 1)
     if kind == "PALETTE" and table is not None:
@@ -165,7 +163,9 @@ def _planes(series: Any) -> int:
 def _page(count: int, page: int | None, where: str) -> int:
     """The page to read, from 1; raises where it is not there, or not said and there are several."""
     if page is None and count > 1:
-        raise RaptorError(f"{where} holds {count} pages (time points, slices or channels); give --page 1 to {count}")
+        raise RaptorError(
+            f"{where} holds {count} pages (time points, slices or channels); give --page 1 to {count}"
+        )
     page = 1 if page is None else page
     if not 1 <= page <= count:
         raise RaptorError(f"{where} has no page {page}; it holds {count}")
@@ -174,14 +174,13 @@ def _page(count: int, page: int | None, where: str) -> int:
 
 def _require_size(width: int, height: int, where: str) -> None:
     if width * height > MOST_PIXELS:
-        raise RaptorError(
-            f"{where} is {width} x {height} pixels large, more than {MOST_PIXELS // 1_000_000} million; reduce it"
-        )
+        most = f"{MOST_PIXELS // 1_000_000} million"
+        raise RaptorError(f"{where} is {width} x {height} pixels large, more than {most}; reduce it")
 
 
 def _narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
     """Pillow's 32-bit integers in the 16 bits that files hold, where they fit."""
-    return values.astype(np.uint16) if 0 <= values.min() and values.max() < 65536 else values
+    return values.astype(np.uint16) if values.min() >= 0 and values.max() < 65536 else values
 
 
 def _scaled(values: NDArray[Any]) -> NDArray[np.float64]:

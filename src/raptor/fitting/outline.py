@@ -7,23 +7,21 @@ both are found to a part of a pixel (marching squares).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image
 from skimage.filters import threshold_otsu
 from skimage.measure import find_contours
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import read_input
+from raptor.core.pixels import read_pixels
 from raptor.fitting.least_squares import Minimum
 from raptor.fitting.targets import Measure, as_array, parameters_at
 from raptor.frame import IMAGE_SIZE, pixel_size
-from raptor.moulds.bitmap import DAMAGE, MOST_PIXELS
+from raptor.moulds.bitmap import MOST_PIXELS
 from raptor.parameters import CellParameters
 
 POINTS = 128  # along the measured outline
@@ -62,7 +60,7 @@ class Outline:
         return cls(shapely.get_coordinates(np.concatenate(points)), float(length))
 
 
-def read_outline(path: Path) -> Outline:
+def read_outline(path: Path, page: int | None = None) -> Outline:
     """Read the outline of a tissue from a picture (PNG, JPEG, TIFF) whose frame is the image of 62.5 l0.
 
     The tissue is what differs from the rim of the picture; its edge is half-way between both colours (Otsu).
@@ -73,7 +71,7 @@ def read_outline(path: Path) -> Outline:
     RaptorError
         Where the picture cannot be read, is not square, or shows no tissue.
     """
-    grey = _grey(Path(path))
+    grey = _grey(Path(path), page)
     rim = np.concatenate([grey[0], grey[-1], grey[:, 0], grey[:, -1]])
     if grey.min() == grey.max():
         raise RaptorError(f"outline {path} is of one colour; paint the tissue dark on white")
@@ -146,23 +144,16 @@ def deviations(
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
 
-def _grey(path: Path) -> NDArray[np.float64]:
+def _grey(path: Path, page: int | None) -> NDArray[np.float64]:
     """Lightness (row, column) of a square picture, 0 to 1."""
-    content = read_input(path, "outline", "a picture")
-    try:
-        picture = Image.open(BytesIO(content), formats=["PNG", "JPEG", "TIFF"])
-        if picture.width != picture.height or picture.width > MOST_PIXELS:
-            raise RaptorError(
-                f"outline {path} is {picture.width} x {picture.height} pixels large; crop it to the square "
-                f"frame of {IMAGE_SIZE} l0 about the mould's centre, at most {MOST_PIXELS} pixels a side"
-            )
-        layers = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
-    except RaptorError:
-        raise
-    except DAMAGE as error:
-        raise RaptorError(f"outline {path} is no picture, or is cut short: {error}") from error
-    opacity = layers[..., 3]
-    return np.asarray(layers[..., :3].mean(axis=2) * opacity + 1 - opacity)
+    colours = read_pixels(path, "outline", page).on_white
+    rows, columns = colours.shape[:2]
+    if rows != columns or columns > MOST_PIXELS:
+        raise RaptorError(
+            f"outline {path} is {columns} x {rows} pixels large; crop it to the square frame of {IMAGE_SIZE} "
+            f"l0 about the mould's centre, at most {MOST_PIXELS} pixels per side"
+        )
+    return np.asarray(colours.mean(axis=2))
 
 
 def _pieces(excess: NDArray[np.floating], what: str) -> shapely.Geometry:

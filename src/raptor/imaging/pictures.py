@@ -1,14 +1,16 @@
 """Pictures of tissues: grey-scale photographs and two-valued masks."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage import color, io, transform, util
+from skimage import color, transform, util
 
 from raptor.core.errors import RaptorError
+from raptor.core.pixels import read_pixels
 
 LONGEST_SIDE = 1600  # pixels; a larger picture is reduced by an integer factor
 SMALLEST_SIDE = 32  # pixels; needed to find an outline
@@ -33,30 +35,69 @@ class Picture:
     reduction: int = 1
 
 
-def read_picture(path: Path) -> Picture:
-    """Read a photograph or a mask; colours become luminance, transparency is ignored.
+def read_picture(path: Path, page: int | None = None, channel: str | None = None) -> Picture:
+    """Read a photograph or a mask as a viewer shows it; transparency is ignored.
+
+    Parameters
+    ----------
+    page : int, optional
+        Time point, slice or page of a file that has several, from 1.
+    channel : str, optional
+        What is taken for brightness: red, green, blue, saturation or hue; without it, luminance.
 
     Raises
     ------
     RaptorError
-        If the file is missing, not an image, a stack of images, too small or of one value.
+        If the file is missing or not an image, has several pages and none is chosen, or is too small or of
+        one value; and if the channel is unknown or the picture is grey.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise RaptorError(f"image {path} does not exist; check the path")
-    try:
-        pixels = np.asarray(io.imread(path))
-    except Exception as error:  # each format's reader raises its own errors
-        raise RaptorError(f"{path} is not an image that can be read; give a PNG, TIFF or JPEG") from error
-    if pixels.ndim == 3 and pixels.shape[-1] in (2, 3, 4):
-        pixels = pixels[..., 0] if pixels.shape[-1] == 2 else color.rgb2gray(pixels[..., :3])
-    if pixels.ndim != 2:
-        raise RaptorError(f"{path} holds an array of shape {pixels.shape}; give one picture, not a stack")
-    if min(pixels.shape) < SMALLEST_SIDE:
-        raise RaptorError(
-            f"{path} is {pixels.shape[1]} x {pixels.shape[0]} pixels; at least {SMALLEST_SIDE} are needed"
-        )
-    return as_picture(pixels, str(path))
+    colours = read_pixels(path, "image", page).colours
+    if min(colours.shape[:2]) < SMALLEST_SIDE:
+        rows, columns = colours.shape[:2]
+        raise RaptorError(f"image {path} is {columns} x {rows} pixels; at least {SMALLEST_SIDE} are needed")
+    return as_picture(channel_of(colours, channel, f"image {path}"), f"image {path}")
+
+
+def channel_of(colours: NDArray[np.float64], channel: str | None, name: str) -> NDArray[np.float64]:
+    """One value per pixel (row, column) from colours (row, column, 1 or 3); None is luminance.
+
+    Raises
+    ------
+    RaptorError
+        If the channel is unknown, or the colours are grey.
+    """
+    if channel is not None and channel not in CHANNELS:
+        raise RaptorError(f"channel is {channel}; allowed are {', '.join(CHANNELS)}")
+    grey = colours.shape[-1] == 1 or bool((np.ptp(colours, axis=-1) == 0).all())
+    if channel is None:
+        return colours[..., 0] if colours.shape[-1] == 1 else np.asarray(color.rgb2gray(colours))
+    if grey:
+        raise RaptorError(f"{name} is grey, so it has no channel {channel}; leave --channel away")
+    return np.asarray(CHANNELS[channel](colours), dtype=np.float64)
+
+
+def hue(colours: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colour (row, column) without lightness, 0.5 to 1, along the direction in which the colours differ.
+
+    Hue is an angle, and black and grey have none. In the plane of a* and b* (CIE 1976) two hues are two
+    points, and the principal axis of all pixels runs from one to the other.
+    """
+    plane = color.rgb2lab(colours)[..., 1:]
+    plane -= plane.mean(axis=(0, 1))
+    _, axes = np.linalg.eigh(np.einsum("yxa,yxb->ab", plane, plane))
+    along = plane @ axes[:, -1]
+    low, high = np.percentile(along, (0.1, 99.9))
+    return np.asarray(0.5 + 0.5 * np.clip((along - low) / max(high - low, 1e-9), 0, 1))
+
+
+CHANNELS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "red": lambda colours: colours[..., 0],
+    "green": lambda colours: colours[..., 1],
+    "blue": lambda colours: colours[..., 2],
+    "saturation": lambda colours: np.asarray(color.rgb2hsv(colours)[..., 1]),
+    "hue": hue,
+}
+"""What may be taken for brightness where a tissue is told by its colour."""
 
 
 def as_picture(pixels: NDArray[np.generic], name: str) -> Picture:

@@ -31,7 +31,7 @@ def read_bitmap(path: Path, page: int | None = None) -> Drawing:
     Raises
     ------
     RaptorError
-        Where the file is no picture, or shows no depression or several.
+        If the file is no picture, or shows no depression or several.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -39,7 +39,8 @@ def read_bitmap(path: Path, page: int | None = None) -> Drawing:
     rows, columns = colours.shape[:2]
     if max(rows, columns) > MOST_PIXELS:
         raise RaptorError(
-            f"{where} is {columns} x {rows} pixels large; make it at most {MOST_PIXELS} a side (1,000 are plenty)"
+            f"{where} is {columns} x {rows} pixels large; reduce it to at most {MOST_PIXELS} per side "
+            "(1,000 are enough)"
         )
     sheet, walls = Page(-0.5, 0.5 - rows, columns, rows), tuple(_walls(colours, where))
     # A square picture is the frame, as it is for photographs that are aligned with the mould.

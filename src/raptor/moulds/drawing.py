@@ -98,9 +98,9 @@ class Drawing:
     unit : str
         What messages call a drawing unit.
     mm : float or None
-        Millimetres a unit, where the file has a real unit.
+        Millimetres per unit, where the file has a real unit.
     l0 : float or None
-        l0 a unit, where the file says so.
+        l0 per unit, where the file says so.
     framed : bool
         Whether the page, a square, is drawn as the frame.
     blur : float
@@ -120,14 +120,14 @@ class Drawing:
     def mould(self, path: Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
         """The mould drawn in the file `path`, lengths in l0.
 
-        The middle of the outline's bounding box is the origin. Without a scale (l0 a drawing unit, or
-        millimetres an l0) the page is the frame where it is drawn as that, and otherwise the outline's longest
-        side becomes 52 l0.
+        The middle of the outline's bounding box is the origin. Without a scale (l0 per drawing unit, or
+        millimetres per l0) the page is the frame if it is drawn as that; if not, the outline's longest side
+        becomes 52 l0.
 
         Raises
         ------
         RaptorError
-            Where no outline is drawn or several, or the mould cannot be cast; a scale that fits is named.
+            If no outline is drawn or several, or the mould cannot be cast; a scale that fits is named.
         """
         try:
             outline, tethers = _told_apart(self._closed(), self.page)
@@ -184,7 +184,7 @@ class Drawing:
         made = Placement(*middle, scale, mm_per_l0, fitted)
         if not 1 <= longest * scale <= IMAGE_SIZE * (1 + 1e-6):
             raise RaptorError(
-                f"the outline is {width * scale:.4g} x {height * scale:.4g} l0 at {scale:.4g} l0 a "
+                f"the outline is {width * scale:.4g} x {height * scale:.4g} l0 at {scale:.4g} l0 per "
                 f"{self.unit}, and the frame is {IMAGE_SIZE} l0 wide; {self._advice(named, longest, scale)}"
             )
         return made
@@ -203,7 +203,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Placement:
-    """The point (x, y) of a drawing that is the frame's origin, l0 a drawing unit, and what they came from."""
+    """The point (x, y) of a drawing that is the frame's origin, and l0 per drawing unit."""
 
     x: float
     y: float
@@ -213,7 +213,7 @@ class Placement:
 
     def note(self, unit: str) -> str:
         """How the drawing was scaled, for people."""
-        said = f"{self.scale:.4g} l0 a {unit}"
+        said = f"{self.scale:.4g} l0 per {unit}"
         return f"fitted to the frame at {said} (overrule by --scale)" if self.fitted else said
 
 
@@ -287,9 +287,7 @@ def _told_apart(shapes: list[Shape], page: Page | None) -> tuple[Shape, list[Sha
         )
     candidates = outlines or [shape for shape in shapes if shape.role != "tether"]
     if not candidates:
-        raise RaptorError(
-            "it draws no outline; draw the depression as a closed shape and call it 'outline'"
-        )
+        raise RaptorError("it draws no outline; draw the depression as a closed shape and call it 'outline'")
     outline = max(candidates, key=lambda shape: shape.size)
     others = [shape for shape in shapes if shape is not outline]
     if outlines:
@@ -354,26 +352,40 @@ def _require_wide(tether: Tether, name: str, placement: Placement, outline: shap
     advice = f"give {needed}" if fits else "draw it wider (no scale that fits the frame makes it so)"
     raise RaptorError(
         f"tether {name} is too thin to hold cells back: {2 * half:.2g} l0 across at "
-        f"{placement.scale:.4g} l0 a unit, {2 * SMALLEST_TETHER} are needed; {advice}"
+        f"{placement.scale:.4g} l0 per unit, {2 * SMALLEST_TETHER} are needed; {advice}"
     )
 
 
 def _require_closed(lines: Sequence[Line], closed: Sequence[Shape], longest: float) -> None:
-    """Raise a RaptorError where lines nearly close an outline, or one of that name stays open."""
-    outlined = any(shape.role == "outline" for shape in closed)
-    called = [line for line in lines if line.role == "outline" and not outlined]
-    for shape in [] if outlined else joined(lines, WIDE_GAP * longest):
-        around = all(shape.polygon.envelope.covers(other.polygon) for other in closed)
-        if around and not any(_same(shape, other) for other in closed):
-            called.append(next(line for line in lines if line.name == shape.name))
-    if not closed and not called:
-        called.append(max(lines, key=lambda line: float(np.ptp(line.corners, axis=0).max())))
-    if called:
-        (x0, y0), (x1, y1) = called[0].corners[0], called[0].corners[-1]
-        raise RaptorError(
-            f"the outline is not closed: {called[0].name} runs from ({x0:.4g}, {-y0:.4g}) to "
-            f"({x1:.4g}, {-y1:.4g}), and ends farther than {GAP * longest:.2g} from the next line; close it"
-        )
+    """Raise a RaptorError if lines nearly close an outline, or one of that name stays open."""
+    if any(shape.role == "outline" for shape in closed):
+        return
+    nearly = [
+        shape
+        for shape in joined(lines, WIDE_GAP * longest)
+        if not any(_same(shape, other) for other in closed)
+        and all(shape.polygon.envelope.covers(other.polygon) for other in closed)
+    ]
+    called = [line for line in lines if line.role == "outline"]
+    if nearly or called or not closed:
+        name = (called or nearly or lines)[0].name
+        raise RaptorError(f"no line closes an outline: {_gap(lines, longest) or f'{name} is open'}; close it")
+
+
+def _gap(lines: Sequence[Line], longest: float) -> str | None:
+    """The widest gap between two ends that were meant to meet, for messages."""
+    ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
+    tree = KDTree(ends)
+    meet = {int(end) for pair in tree.query_pairs(GAP * longest) for end in pair}
+    gaps = [
+        (float(np.hypot(*(ends[i] - ends[j]))), i, j)
+        for i, j in tree.query_pairs(WIDE_GAP * longest)
+        if not {i, j} & meet
+    ]
+    if not gaps:
+        return None
+    width, i, j = max(gaps)
+    return f"{lines[i // 2].name} and {lines[j // 2].name} end {width:.3g} apart"
 
 
 def _on_rows(shape: Tether, blur: float) -> Tether:

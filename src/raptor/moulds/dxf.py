@@ -10,20 +10,25 @@ from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import shapely
 from ezdxf import path as paths
-from ezdxf import recover, units
+from ezdxf import recover
 from ezdxf.addons.drawing.properties import RenderContext
 from ezdxf.disassemble import recursive_decompose
 from ezdxf.document import Drawing as Document
-from ezdxf.entities import DXFGraphic, Insert
+from ezdxf.entities.dxfgfx import DXFGraphic
+from ezdxf.entities.insert import Insert
+from ezdxf.enums import InsertUnits
+from ezdxf.lldxf.const import DXFError
+from ezdxf.lldxf.tagger import binary_tags_loader
+from ezdxf.units import conversion_factor
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
 from raptor.moulds.drawing import Drawing, Line, Shape, role_of
 
+BINARY = b"AutoCAD Binary DXF"
 DRAWN = {"LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE", "SOLID", "TRACE", "3DFACE"}
 FLAT = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
 MOST_SHAPES = 20_000
@@ -35,7 +40,7 @@ def read_dxf(path: Path) -> Drawing:
     Raises
     ------
     RaptorError
-        Where the file is not DXF, or draws too much.
+        If the file is not DXF, or draws too much.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -44,10 +49,12 @@ def read_dxf(path: Path) -> Drawing:
     lines: list[Line] = []
     for number, piece in enumerate(_pieces(document)):
         if number >= MOST_SHAPES:
-            raise RaptorError(f"{where} draws more than {MOST_SHAPES} lines; keep the outline and the tethers")
+            raise RaptorError(
+                f"{where} draws more than {MOST_SHAPES} lines; keep the outline and the tethers"
+            )
         (shapes if isinstance(piece, Shape) else lines).append(piece)  # type: ignore[arg-type]
     unit = document.units
-    mm = float(units.conversion_factor(unit, units.MM)) if unit else None
+    mm = float(conversion_factor(InsertUnits(unit), InsertUnits.Millimeters)) if unit else None
     return Drawing(tuple(shapes), tuple(lines), unit="drawing unit", mm=mm)
 
 
@@ -55,11 +62,13 @@ def _document(content: bytes, where: str) -> Document:
     """A DXF document, repaired where that can be done."""
     logging.getLogger("ezdxf").setLevel(logging.ERROR)
     try:
+        if content.startswith(BINARY):
+            return Document.load(binary_tags_loader(content))
         document, auditor = recover.read(BytesIO(content))
-    except (ezdxf.DXFError, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+    except (DXFError, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
         raise RaptorError(
-            f"{where} is not DXF, or is cut short: its content {kind_of(content)} ({error}); save it again as DXF "
-            "(AutoCAD 2000 or later)"
+            f"{where} is not DXF, or is truncated: its content {kind_of(content)} ({error}); save it "
+            "again as DXF (AutoCAD 2000 or later)"
         ) from error
     if auditor.has_errors:
         first = auditor.errors[0].message
@@ -69,24 +78,23 @@ def _document(content: bytes, where: str) -> Document:
 
 def _pieces(document: Document) -> Iterator[Shape | Line]:
     """What the model space draws, y up, drawing units."""
-    context = RenderContext(document)
+    context = RenderContext(document, export_mode=True)  # as it is printed
     for outer in document.modelspace():
         if not isinstance(outer, DXFGraphic) or outer.dxftype() == "DIMENSION":
             continue
         named = [outer.dxf.get("layer", ""), outer.dxf.get("name", "") if isinstance(outer, Insert) else ""]
         for entity in recursive_decompose([outer]):
             kind = entity.dxftype()
-            if kind not in DRAWN or not context.resolve_visible(entity):
+            if not isinstance(entity, DXFGraphic) or kind not in DRAWN or not context.resolve_visible(entity):
                 continue
             layer = entity.dxf.get("layer", "0")
-            if not context.resolve_layer_properties(layer).plot:
-                continue
-            yield from _traced(entity, f"{kind} {entity.dxf.get('handle') or 'in ' + named[1]} on layer '{layer}'", role_of(layer, *named))
+            name = f"{kind} {entity.dxf.get('handle') or 'in ' + named[1]} on layer '{layer}'"
+            yield from _traced(entity, name, role_of(layer, *named))
 
 
 def _traced(entity: DXFGraphic, name: str, role: str) -> Iterator[Shape | Line]:
     """An entity as closed and open lines."""
-    for path in paths.make_path(entity).sub_paths() if paths.has_path_support(entity) else ():
+    for path in paths.make_path(entity).sub_paths():
         box = paths.bbox([path], fast=True)
         span = max(box.size.x, box.size.y) if box.has_data else 0.0
         if not span > 0:

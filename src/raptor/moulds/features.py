@@ -29,7 +29,7 @@ def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None
     Raises
     ------
     RaptorError
-        Where it is no GeoJSON, or holds no mould that can be cast, or several.
+        If it is no GeoJSON, or holds no mould that can be cast, or several.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -106,7 +106,7 @@ def _require_one_mould(features: list[dict[str, Any]], where: str) -> None:
     count = sum("tethers" in (feature.get("properties") or {}) for feature in features)
     if count > 1:
         raise RaptorError(
-            f"{where} gives the depression in {count} pieces; a mould is one connected outline, so keep one feature"
+            f"{where} gives the depression in {count} pieces; a mould is one connected outline, so keep one"
         )
 
 
@@ -116,8 +116,8 @@ def _require_one_piece(shapes: tuple[Shape, ...], where: str) -> None:
     apart = [shape for shape in bodies[1:] if not bodies[0].polygon.buffer(0).intersects(shape.polygon)]
     if apart:
         raise RaptorError(
-            f"{where} gives the depression in {1 + len(apart)} pieces ({bodies[0].name}, {apart[0].name}); a mould "
-            "is one connected outline, so keep one"
+            f"{where} gives the depression in {1 + len(apart)} pieces ({bodies[0].name}, {apart[0].name}); a "
+            "mould is one connected outline, so keep one"
         )
     if not shapes:
         raise RaptorError(f"{where} draws nothing that encloses an area; a Polygon is expected")

@@ -38,7 +38,7 @@ def read_features(path: Path) -> list[dict[str, Any]]:
     Raises
     ------
     RaptorError
-        Where the file is missing, empty or not GeoJSON, or holds no feature.
+        If the file is missing, empty or not GeoJSON, or holds no feature.
     """
     path = Path(path)
     text = read_text(path, "mould file", "a GeoJSON polygon")
@@ -47,7 +47,7 @@ def read_features(path: Path) -> list[dict[str, Any]]:
     except RecursionError:
         raise RaptorError(f"mould file {path} is nested too deeply; a mould is a Polygon or a few") from None
     except ValueError as error:  # not JSON, or a number of thousands of digits
-        raise RaptorError(f"mould file {path} is not GeoJSON: {error}") from error
+        raise RaptorError(f"mould file {path} is not GeoJSON: {str(error).split(';')[0]}") from error
     kind = document.get("type") if isinstance(document, dict) else None
     features: list[Any] = []
     if kind == "FeatureCollection":
@@ -124,7 +124,7 @@ def tethers_of(properties: dict[str, Any], where: str) -> tuple[Tether, ...]:
     Raises
     ------
     RaptorError
-        Where one is neither a circle nor a polygon.
+        If one is neither a circle nor a polygon.
     """
     entries = properties.get("tethers") or []
     if isinstance(entries, str):
@@ -165,7 +165,7 @@ def polygon_of(ring: Any, what: str) -> shapely.Polygon:
     Raises
     ------
     RaptorError
-        Where it has less than three corners, or one is not finite.
+        If it has less than three corners, or one is not finite.
     """
     try:
         if len(ring) < 3:

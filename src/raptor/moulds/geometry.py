@@ -135,14 +135,14 @@ class Mould:
     name : str
         Mould id or file name, for messages.
     mm_per_l0 : float or None
-        Millimetres an l0, where the mould was drawn in a real unit.
+        Millimetres per l0, where the mould was drawn in a real unit.
     note : str
         How a drawing was scaled, for people.
 
     Raises
     ------
     RaptorError
-        Where the outline or a tether cannot be cast: see `validate`.
+        If the outline or a tether cannot be cast: see `validate`.
 
     Examples
     --------

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input
-from raptor.core.pixels import SUFFIXES as PICTURES
 from raptor.moulds.geometry import Mould
 from raptor.moulds.library import MOULDS
 
+PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".webp")
 SUFFIXES = (".geojson", ".json", ".svg", ".svgz", ".dxf", *PICTURES)
 """Suffixes of the files that `read_mould` reads."""
 
@@ -20,7 +20,7 @@ def find_mould(name: str | Path) -> Path:
     Raises
     ------
     RaptorError
-        Where there is neither.
+        If there is neither.
     """
     path = Path(name)
     if path.suffix or path.exists():
@@ -62,9 +62,9 @@ def read_mould(
     path : str or Path
         Name of a standard mould, or a file: GeoJSON, SVG, DXF, or a picture (PNG, TIFF, JPEG, ...).
     scale : float, optional
-        l0 a unit of the file: of a coordinate, of an SVG user unit, or of a pixel.
+        l0 per unit of the file: of a coordinate, of an SVG user unit, or of a pixel.
     mm_per_l0 : float, optional
-        Millimetres an l0. It sets the scale of a file that has a real unit (mm, cm, in, pt) where `scale` does
+        Millimetres per l0. It sets the scale of a file that has a real unit (mm, cm, in, pt) if `scale` does
         not; otherwise it only says how long an l0 is.
     page : int, optional
         Page of a picture that has several, from 1.
@@ -72,12 +72,13 @@ def read_mould(
     Raises
     ------
     RaptorError
-        Where the file is missing, unreadable, of another kind, or holds no mould that can be cast.
+        If the file is missing, unreadable, of another kind, or holds no mould that can be cast.
     """
     path = find_mould(path)
     for name, value in (("scale", scale), ("mm_per_l0", mm_per_l0)):
         if value is not None and not (isfinite(value) and value > 0):
-            raise RaptorError(f"{name} is {value}; give a positive number (of {path.name})")
+            of = "l0 per unit" if name == "scale" else "mm per l0"
+            raise RaptorError(f"{name} is {value}; give a positive number of {of} ({path.name})")
     suffix = path.suffix.lower()
     # Imported here: a simulation job reads GeoJSON, and need not load what reads drawings.
     if suffix in (".svg", ".svgz"):

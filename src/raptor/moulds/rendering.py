@@ -84,7 +84,7 @@ def drawn_shapes(root: Element, page: tuple[float, float]) -> list[Drawn]:
     Raises
     ------
     RaptorError
-        Where the renderer refuses the document, or it draws too many shapes.
+        If the renderer refuses the document, or it draws too many shapes.
     """
     document = _prepared(root, page)
     elements = {element.get("id", ""): element for element in document.iter() if tag_of(element) in SHAPES}
@@ -96,7 +96,7 @@ def drawn_shapes(root: Element, page: tuple[float, float]) -> list[Drawn]:
         raise RaptorError(f"it draws {len(names)} shapes; a mould is an outline and its tethers: keep those")
     shapes = []
     for name, look in zip(names, _looks(document, page, [elements[n] for n in names], boxes), strict=True):
-        matrix = np.linalg.solve(frame, matrices[name])
+        matrix = np.asarray(np.linalg.solve(frame, matrices[name]), dtype=np.float64)
         corner = np.linalg.solve(frame, [*boxes[name][:2], 1])[:2]
         box = np.append(corner, boxes[name][2:] / np.abs(np.diag(frame)[:2]))
         if look is not None and abs(np.linalg.det(matrix)) > 0:

@@ -1,4 +1,4 @@
-"""Moulds drawn as SVG: shapes that a renderer shows, told apart by their names or by their size (docs/moulds.md).
+"""Moulds drawn as SVG: what a renderer shows, told apart by names or by size (docs/moulds.md).
 
 A shape is a path, polygon, polyline, rectangle, circle or ellipse that is seen; strokes, fills, text and
 images do not count. A path of several pieces is several shapes. An open piece is a shape where it is filled,
@@ -18,7 +18,6 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import shapely
 import svgelements
-from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input
@@ -47,7 +46,7 @@ def read_svg(path: Path) -> Drawing:
     Raises
     ------
     RaptorError
-        Where the file is not SVG, or a shape in it cannot be read.
+        If the file is not SVG, or a shape in it cannot be read.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -78,12 +77,12 @@ def _root(content: bytes, where: str) -> Element:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError, OSError, EOFError) as error:
         raise RaptorError(
-            f"{where} is not SVG, or is cut short: {error}; save it again as plain SVG"
+            f"{where} is not SVG, or is truncated: {error}; save it again as plain SVG"
         ) from error
     if tag_of(root) != "svg":
         raise RaptorError(f"{where} is not SVG: its root is <{tag_of(root)}>; save it as plain SVG")
     if root.tag != f"{{{NAMESPACE}}}svg":
-        raise RaptorError(f'{where} cannot be read: the root has not the namespace xmlns="{NAMESPACE}"')
+        raise RaptorError(f'{where} cannot be read: the root lacks the namespace xmlns="{NAMESPACE}"')
     return root
 
 
@@ -107,12 +106,13 @@ def _require_readable(element: Element) -> None:
     except ValueError as error:
         reason = f" ({error})" if str(error) else ""
         raise RaptorError(
-            f"<{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; draw it again, or take it out"
+            f"<{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; draw it again, or "
+            "take it out"
         ) from error
 
 
 def _scale(root: Element, where: str) -> float | None:
-    """The attribute data-l0: l0 a user unit."""
+    """The attribute data-l0: l0 per user unit."""
     text = root.get("data-l0")
     if text is None:
         return None
@@ -121,12 +121,12 @@ def _scale(root: Element, where: str) -> float | None:
     except ValueError:
         value = nan
     if not (isfinite(value) and value > 0):
-        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 a user unit")
+        raise RaptorError(f"{where}: data-l0 is '{text}'; give a positive number, l0 per user unit")
     return value
 
 
 def _page(root: Element) -> tuple[Page | None, float | None, tuple[float, float]]:
-    """The page in user units, millimetres a user unit where its size has a real unit, and its CSS pixels."""
+    """The page in user units, millimetres per user unit if its size has a real unit, and its CSS pixels."""
     sides = [LENGTH.fullmatch(root.get(key, "")) for key in ("width", "height")]
     numbers = [float(side[1]) if side and side[4] != "%" and float(side[1]) > 0 else None for side in sides]
     units = [side[4] or "px" if side else "px" for side in sides]
@@ -149,7 +149,9 @@ def _geometries(elements: list[Element], page: Page | None) -> list[Any]:
     width, height = (page.width, page.height) if page else (1000.0, 1000.0)
     sheet = Element("svg", {"xmlns": NAMESPACE, "width": repr(width), "height": repr(height)})
     for number, element in enumerate(elements):
-        kept = {k: v for k, v in element.attrib.items() if k in LENGTHS | {"d", "points"} and v.strip() != "auto"}
+        kept = {
+            k: v for k, v in element.attrib.items() if k in LENGTHS | {"d", "points"} and v.strip() != "auto"
+        }
         sheet.append(Element(tag_of(element), kept | {"id": str(number)}))
     parsed = svgelements.SVG.parse(BytesIO(ElementTree.tostring(sheet)), reify=False)
     found = {part.id: part for part in parsed.elements() if isinstance(part, DRAWN)}
@@ -170,7 +172,9 @@ def _pieces(drawn: Drawn, geometry: Any) -> Iterator[Shape | Line]:
     for piece in path.as_subpaths():
         piece = svgelements.Path(piece)
         corners = np.array([(point.x, -point.y) for segment in piece for point in _points(segment)])
-        corners = corners[np.append(True, np.any(np.diff(corners, axis=0), axis=1))] if len(corners) else corners
+        corners = (
+            corners[np.append(True, np.any(np.diff(corners, axis=0), axis=1))] if len(corners) else corners
+        )
         if len(corners) < 2:
             continue
         span = float(np.ptp(corners, axis=0).max())
@@ -185,7 +189,9 @@ def _pieces(drawn: Drawn, geometry: Any) -> Iterator[Shape | Line]:
         shapes.append(Shape(name, polygon, role))
     for number, shape in enumerate(sorted(shapes, key=lambda shape: -shape.size)):
         if drawn.left < WHOLE:
-            raise RaptorError(f"{name} is cut by a clip or a mask; apply it, so that the shape ends where it is cut")
+            raise RaptorError(
+                f"{name} is cut by a clip or a mask; apply it, so that the shape ends where it is cut"
+            )
         # What else a path called outline holds stands within its largest piece.
         yield Shape(name, shape.polygon, "tether") if number and role == "outline" else shape
 

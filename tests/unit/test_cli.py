@@ -297,7 +297,7 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
         (("--area-ratio", 0.5, *options()), "or --by simulator"),
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
         (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
-        (("--outline", MOULD), "is no picture, or is cut short"),
+        (("--outline", MOULD), "is no picture that can be read: its content looks like JSON"),
         (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is no picture's name"),
     ],
 )
@@ -357,7 +357,7 @@ def test_check_takes_moulds_and_tables(made, tmp_path):
     bad.write_text('{"type": "FeatureCollection", "features": [1]}')
     done = raptor("check", bad)
     assert done.returncode == 1
-    assert "is not GeoJSON of a mould" in done.stdout
+    assert "holds no mould" in done.stdout
 
 
 def test_a_full_disk_stops_a_simulation_with_one_sentence(tmp_path):

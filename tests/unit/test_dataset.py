@@ -122,8 +122,8 @@ def test_an_example_of_the_test_split_and_a_double_one_are_named(folder):
 def test_a_truncated_shard_is_named(folder):
     path = folder / "simulations" / "0.nc"
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    assert any("0.nc is cut short" in fault for fault in check(folder))
-    with pytest.raises(RaptorError, match="cut short"):
+    assert any("0.nc is truncated or damaged" in fault for fault in check(folder))
+    with pytest.raises(RaptorError, match="is truncated"):
         read_shard(path)
 
 

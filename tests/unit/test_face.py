@@ -150,7 +150,7 @@ def test_a_mould_is_drawn_and_a_notebook_shows_it():
     ("content", "message"),
     [
         (None, "does not exist"),
-        (b"text", "cut short or not netCDF"),
+        (b"text", "is not netCDF: its content looks like none"),
         (True, "not hold the fields"),
     ],
 )

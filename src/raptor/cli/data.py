@@ -1,11 +1,13 @@
 """What a data set holds and where it comes from: check, trace, same, progress, well, reference."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 import yaml
 
+from raptor.cli import options as opt
 from raptor.core.errors import RaptorError
 
 
@@ -39,6 +41,9 @@ def well(
 
 def check(
     path: Annotated[Path, typer.Argument(help="results folder, shard, field stack or mould")],
+    scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    page: opt.Page = None,
     part: Annotated[
         float,
         typer.Option(min=0, max=1, help="of a folder's simulations, chosen at random, to compute again"),
@@ -51,10 +56,11 @@ def check(
       raptor check mould.svg
     """
     from raptor.dataset.check import check as find_faults
+    from raptor.moulds import read_mould
 
     if not path.exists():
         raise RaptorError(f"{path} does not exist; check the path")
-    faults = find_faults(path, part)
+    faults = find_faults(path, part, partial(read_mould, scale=scale, mm_per_l0=mm_per_l0, page=page))
     for fault in faults:
         typer.echo(fault)
     typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")

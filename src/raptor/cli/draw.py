@@ -14,6 +14,8 @@ def draw(
     mould: opt.Mould,
     output: Annotated[Path | None, typer.Option(help="picture to write, PNG or SVG")] = None,
     scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    page: opt.Page = None,
     layers: opt.Layers = 7,
     like: Annotated[
         Path | None, typer.Option(help="another mould to compare with, drawn dashed beside the first")
@@ -28,6 +30,7 @@ def draw(
 
     Example:
       raptor draw mould.svg --output mould.png
+      raptor draw plate.dxf --mm-per-l0 0.1
       raptor draw mask.png --scale 0.05 --geojson mould.geojson
       raptor draw mask.png --like mould.geojson --json
     """
@@ -39,7 +42,7 @@ def draw(
         if geojson.suffix not in (".geojson", ".json"):
             raise raptor.RaptorError(f"{geojson} is no GeoJSON's name; give one that ends in .geojson")
         opt.require_writable(geojson, mould, like, kind="a GeoJSON file")
-    shape = raptor.read_mould(mould, scale)
+    shape = raptor.read_mould(mould, scale, mm_per_l0, page)
     summary = summarise(shape, raptor.NetworkModel(layers).layers)
     numbers, rows = dict[str, Any](asdict(summary)), summary.rows
     other = None if like is None else raptor.read_mould(like)

@@ -32,6 +32,8 @@ def fit(
     kappa_nnn: opt.KappaNNN = None,
     kappa_nnnn: opt.KappaNNNN = None,
     scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    page: opt.Page = None,
     layers: Annotated[
         int | None, typer.Option(help="cell layers of simulations; without it those of the surrogate")
     ] = None,
@@ -64,7 +66,7 @@ def fit(
     if tissue is not None:
         ratios = _measured(tissue, tissues, ratios)
     start = None if parameters == (None, None, None) else opt.cell_parameters(*parameters)
-    shape = raptor.read_mould(mould, scale)
+    shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
     opt.require_writable(output, mould, outline, kind="a JSON file")
     opt.require_picture_writable(picture, mould, outline, output)
     found = raptor.fit(
@@ -73,7 +75,8 @@ def fit(
     )  # fmt: skip
     found.save(output)
     opt.save_picture(found, picture)
-    opt.report(f"{output}: {found}", found.numbers | {"output": output, "picture": picture}, as_json)
+    numbers = found.numbers | {"mm_per_l0": shape.mm_per_l0, "output": output, "picture": picture}
+    opt.report(f"{output}: {found}", numbers, as_json)
 
 
 def _measured(

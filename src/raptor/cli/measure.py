@@ -18,18 +18,30 @@ Landmarks = Annotated[
     typer.Option("--landmark", help='"column,row=x,y" or "column,row=tether 1"; at least two'),
 ]
 Aligned = Annotated[bool, typer.Option("--aligned", help="the image is the frame, 62.5 l0 wide")]
+Channel = Annotated[
+    str | None,
+    typer.Option(help="red, green, blue, saturation or hue: what tells tissue from floor [luminance]"),
+]
 Mirrored = Annotated[bool, typer.Option("--mirrored", help="taken from below or in a mirror")]
 
 
 def measure(
     image: Photograph,
-    mould: Annotated[Path, typer.Option(help="mould by name, or a GeoJSON, SVG or PNG file")],
+    mould: Annotated[Path, typer.Option(help="mould by name, or a file: SVG, DXF, GeoJSON or a picture")],
     scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    mould_page: Annotated[int | None, typer.Option(help="page of a mould's picture that has several")] = None,
+    page: opt.Page = None,
+    channel: Channel = None,
     look: Look = "auto",
     threshold: Threshold = None,
     landmarks: Landmarks = None,
     aligned: Aligned = False,
-    mirrored: Mirrored = False,
+    mirrored: Channel = Annotated[
+    str | None,
+    typer.Option(help="red, green, blue, saturation or hue: what tells tissue from floor [luminance]"),
+]
+Mirrored = False,
     overlay: Annotated[Path | None, typer.Option(help="picture to check by eye, PNG or SVG")] = None,
     outline: Annotated[Path | None, typer.Option(help="GeoJSON of the outline, in l0")] = None,
     as_json: opt.Json = False,
@@ -39,14 +51,15 @@ def measure(
     Example:
       raptor measure photograph.png --mould four_post_rectangle
           --overlay overlay.png --outline tissue.geojson
+      raptor measure stack.tif --page 3 --channel hue --mould mould.svg
     """
     opt.require_picture_writable(overlay, image, mould, outline)
     if outline is not None:
         opt.require_writable(outline, image, mould, kind="a GeoJSON file")
-    shape = raptor.read_mould(mould, scale)
+    shape = opt.read_mould(mould, scale, mm_per_l0, mould_page)
     measured = raptor.measure(
         image, shape, look=look, threshold=threshold, landmarks=landmarks or (), aligned=aligned,
-        mirrored=mirrored,
+        mirrored=mirrored, page=page, channel=channel,
     )  # fmt: skip
     opt.save_picture(measured, overlay)
     if outline is not None:

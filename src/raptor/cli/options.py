@@ -14,14 +14,22 @@ import raptor
 if TYPE_CHECKING:
     from raptor.dataset.result import Result
 
-Mould = Annotated[Path, typer.Argument(help="a mould of the library by name, or a GeoJSON, SVG or PNG file")]
+Mould = Annotated[
+    Path,
+    typer.Argument(help="a mould of the library by name, or a file: SVG, DXF, GeoJSON or a picture"),
+]
 Scale = Annotated[
     float | None,
     typer.Option(
-        help="l0 a unit of the mould's file (GeoJSON coordinate, SVG user unit, pixel); without it a GeoJSON "
-        "is in l0, and the page of a drawing is the frame of 62.5 l0"
+        help="l0 per unit of the mould's file (user unit, coordinate, pixel); without it a drawing is fitted "
+        "to the frame: its longest side becomes 52 l0"
     ),
 ]
+MmPerL0 = Annotated[
+    float | None,
+    typer.Option(help="millimetres per l0; with a drawing in a real unit (mm, cm, in, pt) it sets the scale"),
+]
+Page = Annotated[int | None, typer.Option(help="page, slice or time point of a picture that has several")]
 Delta = Annotated[float | None, typer.Option(help="cell-matrix interaction, 0 to 1")]
 KappaNNN = Annotated[float | None, typer.Option("--kappa-nnn", help="second spring constant, in kappa0")]
 KappaNNNN = Annotated[float | None, typer.Option("--kappa-nnnn", help="third spring constant, in kappa0")]
@@ -38,6 +46,17 @@ Output = Annotated[Path, typer.Option(help="netCDF file to write")]
 Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write, PNG or SVG")]
 Json = Annotated[bool, typer.Option("--json", help="print numbers as JSON, for scripts")]
 Layers = Annotated[int, typer.Option(help="cell layers between floor and fill height")]
+
+
+def read_mould(
+    mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None, layers: int | None = None
+) -> raptor.Mould:
+    """Read a mould, and say on standard error how it was scaled and what it measures in millimetres."""
+    shape = raptor.read_mould(mould, scale, mm_per_l0, page)
+    said = [shape.note, shape.in_millimetres(layers)]
+    if any(said):
+        typer.echo(f"{mould}: {'; '.join(filter(None, said))}", err=True)
+    return shape
 
 
 def cell_parameters(
@@ -110,7 +129,8 @@ def finish(result: "Result", output: Path, picture: Path | None, as_json: bool) 
     """Write a tissue or a prediction and its picture, and say what it is."""
     raptor.save(result, output)
     save_picture(result, picture)
-    report(f"{output}: {result}", result.numbers | {"output": output, "picture": picture}, as_json)
+    numbers = result.numbers | {"mm_per_l0": result.mould.mm_per_l0, "output": output, "picture": picture}
+    report(f"{output}: {result}", numbers, as_json)
 
 
 def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
@@ -123,6 +143,7 @@ def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
+    value = value.item() if hasattr(value, "item") else value  # numpy's numbers
     if isinstance(value, float) and not isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value

@@ -14,6 +14,8 @@ def predict(
     tissue: opt.Tissue = None,
     tissues: opt.Tissues = None,
     scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    page: opt.Page = None,
     picture: opt.Picture = None,
     as_json: opt.Json = False,
 ) -> None:
@@ -27,7 +29,7 @@ def predict(
           --output tissue.nc --picture tissue.png
     """
     cells = opt.cell_parameters(delta, kappa_nnn, kappa_nnnn, tissue, tissues)
-    shape = raptor.read_mould(mould, scale)
+    shape = opt.read_mould(mould, scale, mm_per_l0, page)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
     opt.finish(raptor.predict(shape, cells, model), output, picture, as_json)

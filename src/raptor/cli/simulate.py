@@ -17,6 +17,8 @@ def simulate(
     tissue: opt.Tissue = None,
     tissues: opt.Tissues = None,
     scale: opt.Scale = None,
+    mm_per_l0: opt.MmPerL0 = None,
+    page: opt.Page = None,
     layers: opt.Layers = 7,
     accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of every random number")] = 0,
@@ -35,7 +37,7 @@ def simulate(
           --delta 0.5 --kappa-nnn 0.5 --kappa-nnnn 0.3 --output tissue.nc
     """
     cells = opt.cell_parameters(delta, kappa_nnn, kappa_nnnn, tissue, tissues)
-    shape = raptor.read_mould(mould, scale)
+    shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
     opt.finish(raptor.simulate(shape, cells, layers, accuracy, seed), output, picture, as_json)

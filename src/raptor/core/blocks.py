@@ -9,6 +9,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from raptor.core.errors import RaptorError
+from raptor.core.files import decoded
 
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
 Positive = Annotated[int, Field(ge=1)]
@@ -24,7 +25,7 @@ class Block(BaseModel):
 def read_yaml(path: Path) -> dict[str, Any]:
     """The keys of a YAML file, or a RaptorError that says why there are none."""
     try:
-        content = yaml.safe_load(path.read_text())
+        content = yaml.safe_load(decoded(path.read_bytes(), str(path)))
     except OSError as error:
         raise RaptorError(f"{path} cannot be read: {error.strerror}; check the path") from error
     except yaml.YAMLError as error:

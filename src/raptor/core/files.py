@@ -60,6 +60,8 @@ def read_input(path: Path, what: str, expected: str) -> bytes:
         raise RaptorError(f"{what} {path} does not exist; check the path")
     try:
         content = path.read_bytes()
+    except PermissionError as error:
+        raise RaptorError(f"{what} {path} may not be read by this user; ask for permission") from error
     except OSError as error:
         raise RaptorError(f"{what} {path} cannot be read: {error.strerror}") from error
     if not content.strip():
@@ -92,6 +94,35 @@ def kind_of(content: bytes) -> str:
         if content.startswith(signature) or start.startswith(signature):
             return f"looks like {kind}"
     return "looks like none that is known"
+
+
+def why_unreadable(path: Path, error: Exception) -> str:
+    """Why a library cannot open a netCDF or HDF5 file that exists; its own message often names no cause."""
+    if not os.access(path, os.R_OK):
+        return "may not be read by this user; ask for permission"
+    if _is_locked(path):
+        return "is locked by another process that writes it; wait until that ends, then try again"
+    with path.open("rb") as file:
+        start = file.read(4096)
+    if not start:
+        return "is empty"
+    if start.startswith((b"\x89HDF", b"CDF")):
+        return f"is truncated or damaged ({error}); move it away, and make it again"
+    return f"is not netCDF: its content {kind_of(start)}"
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether another process holds a lock on a file, as HDF5 does while it writes."""
+    try:
+        import fcntl
+    except ImportError:  # Windows, where opening a file that is in use fails by itself
+        return False
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
 
 
 def read_text(path: Path, what: str, expected: str) -> str:

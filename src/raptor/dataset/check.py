@@ -24,10 +24,10 @@ from raptor.dataset.shards import Record, Shard, read_shard
 from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
 from raptor.frame import pixel_size
 from raptor.moulds.cast import cast_sites
-from raptor.moulds.geojson import moulds_by_id, read_moulds
+from raptor.moulds.geojson import moulds_by_id, read_features, read_moulds
 from raptor.moulds.geometry import Mould
 from raptor.moulds.raster import mould_image
-from raptor.moulds.reading import read_mould
+from raptor.moulds.reading import SUFFIXES, read_mould
 from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
@@ -35,10 +35,10 @@ RELATIVE = 1e-4  # of recomputed values: storage is float32
 WALL_YIELD = 0.1  # l0; how far a soft wall gives way
 
 
-def check(path: Path, part: float = 1.0) -> list[str]:
+def check(path: Path, part: float = 1.0, read: Callable[[Path], Mould] = read_mould) -> list[str]:
     """Check a results folder, or any file of one: shard, stack, prediction, table, moulds.
 
-    Moulds may be GeoJSON, SVG or PNG.
+    A file of one mould, of any format, is read by `read`.
     Energy, tension and fields of a folder are computed again for a random `part` of its simulations.
 
     Returns
@@ -54,8 +54,8 @@ def check(path: Path, part: float = 1.0) -> list[str]:
     path = Path(path)
     if path.is_dir():
         return list(_check_folder(path, part))
-    if path.suffix.lower() in (".geojson", ".svg", ".png"):
-        return _fault_of(_cast_moulds, path)
+    if path.suffix.lower() in SUFFIXES and path.suffix != ".json":
+        return _fault_of(lambda path: _cast_moulds(path, read), path)
     if path.suffix == ".csv":
         return _fault_of(read_examples if path.name == "examples.csv" else read_design, path)
     if path.suffix == ".json":
@@ -71,9 +71,11 @@ def check(path: Path, part: float = 1.0) -> list[str]:
     raise RaptorError(f"{path} is neither a shard nor fields; nothing to check")
 
 
-def _cast_moulds(path: Path) -> None:
+def _cast_moulds(path: Path, read: Callable[[Path], Mould]) -> None:
     """Read a file's moulds, and cast two layers of each: a mould without cells is of no use."""
-    for mould in read_moulds(path) if path.suffix.lower() == ".geojson" else [read_mould(path)]:
+    is_table = path.suffix.lower() == ".geojson" and len(read_features(path)) > 1
+    is_table = is_table and all("mould" in (each.get("properties") or {}) for each in read_features(path))
+    for mould in read_moulds(path) if is_table else [read(path)]:
         cast_sites(mould, layers=2)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import Generator
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_text
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
@@ -147,14 +147,13 @@ def read_design(path: Path) -> list[Run]:
     path = Path(path)
     if not path.is_file():
         raise RaptorError(f"design {path} does not exist; make it with the workflow")
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise RaptorError(f"design {path} has columns {reader.fieldnames}; {list(COLUMNS)} are expected")
-        try:
-            return [_run(row) for row in reader]
-        except (TypeError, ValueError, KeyError) as error:
-            raise RaptorError(f"design {path}, line {reader.line_num}: {error}") from error
+    reader = csv.DictReader(read_text(path, "design", "a table").splitlines())
+    if tuple(reader.fieldnames or ()) != COLUMNS:
+        raise RaptorError(f"design {path} has columns {reader.fieldnames}; {list(COLUMNS)} are expected")
+    try:
+        return [_run(row) for row in reader]
+    except (TypeError, ValueError, KeyError) as error:
+        raise RaptorError(f"design {path}, line {reader.line_num}: {error}") from error
 
 
 def _run(row: dict[str, str]) -> Run:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, decoded
 from raptor.dataset.netcdf import create
 from raptor.dataset.scaling import Scaling, fit_scaling
 from raptor.dataset.stack import Sample, create_stack, read_samples, read_table
@@ -96,8 +96,8 @@ def read_examples(path: Path) -> list[Example]:
         Where the file is missing or malformed.
     """
     try:
-        with Path(path).open(newline="") as file:
-            return [Example(int(row["sample"]), int(row["element"])) for row in csv.DictReader(file)]
+        lines = decoded(Path(path).read_bytes(), f"examples {path}").splitlines()
+        return [Example(int(row["sample"]), int(row["element"])) for row in csv.DictReader(lines)]
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise RaptorError(f"examples {path} cannot be read: {error}") from error
 

@@ -10,7 +10,7 @@ import netCDF4
 import numpy as np
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, why_unreadable
 from raptor.core.version import MODEL_VERSION, __version__
 
 REFERENCES = (
@@ -50,7 +50,7 @@ def open_file(path: Path, group: str | None = None) -> Iterator[netCDF4.Dataset]
     Raises
     ------
     RaptorError
-        Where it is missing, cut short, or not netCDF.
+        If it is missing, locked, forbidden, truncated, or not netCDF.
     """
     path = Path(path)
     if not path.is_file():
@@ -58,10 +58,7 @@ def open_file(path: Path, group: str | None = None) -> Iterator[netCDF4.Dataset]
     try:
         file = netCDF4.Dataset(path)
     except OSError as error:
-        raise RaptorError(
-            f"{path} is cut short or not netCDF ({error}); if the workflow made it, delete it and run "
-            "the workflow again"
-        ) from error
+        raise RaptorError(f"{path} {why_unreadable(path, error)}") from error
     with file:
         file.set_auto_mask(False)
         yield file if group is None else file[group]

@@ -12,10 +12,11 @@ import xarray as xr
 
 from raptor.condor.simulate import Tissue
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, why_unreadable
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import header
 from raptor.dataset.shards import write_model, write_simulations
+from raptor.moulds.geometry import Mould
 
 CELLS = "cells"
 PACKED = {"zlib": True, "complevel": 4, "shuffle": True}
@@ -23,6 +24,10 @@ PACKED = {"zlib": True, "complevel": 4, "shuffle": True}
 
 class Result(Protocol):
     """What can be saved: a simulated tissue or a prediction."""
+
+    @property
+    def mould(self) -> Mould:
+        """The mould that it was cast in."""
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -61,7 +66,7 @@ def load_fields(path: str | Path) -> xr.Dataset:
     Raises
     ------
     RaptorError
-        Where it is missing, cut short, or no such file.
+        If it is missing, locked, forbidden, truncated, or no such file.
     """
     path = Path(path)
     if not path.is_file():
@@ -69,7 +74,7 @@ def load_fields(path: str | Path) -> xr.Dataset:
     try:
         fields = xr.load_dataset(path, engine="netcdf4")
     except (OSError, ValueError) as error:
-        raise RaptorError(f"{path} is cut short or not netCDF: {error}") from error
+        raise RaptorError(f"{path} {why_unreadable(path, error)}") from error
     if "mould" not in fields.attrs:
         raise RaptorError(
             f"{path} does not hold the fields of one tissue; give one that raptor simulate or predict wrote"

@@ -102,6 +102,6 @@ def read_scaling(path: Path) -> Scaling:
         Where the file is missing or incomplete.
     """
     try:
-        return Scaling.from_json(json.loads(Path(path).read_text()))
+        return Scaling.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError) as error:
         raise RaptorError(f"normalisation {path} cannot be read: {error}") from error

@@ -21,6 +21,8 @@ def measure(
     landmarks: Sequence[str] = (),
     aligned: bool = False,
     mirrored: bool = False,
+    page: int | None = None,
+    channel: str | None = None,
 ) -> MeasuredPhotograph:
     """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask of its mould.
 
@@ -42,6 +44,10 @@ def measure(
         Whether the image is the frame, 62.5 l0 wide.
     mirrored : bool
         Whether it was taken from below or in a mirror.
+    page : int, optional
+        Time point, slice or page of a file that has several, from 1.
+    channel : str, optional
+        red, green, blue, saturation or hue: what tells tissue from floor, in place of luminance.
 
     Raises
     ------
@@ -50,7 +56,7 @@ def measure(
     """
     appearance, mould = imaging.appearance_named(look), as_mould(mould)
     if isinstance(photograph, (str, Path)):
-        picture = imaging.read_picture(Path(photograph))
+        picture = imaging.read_picture(Path(photograph), page, channel)
     else:
         picture = imaging.as_picture(photograph, "the photograph")
     registration = imaging.register(picture, mould, landmarks, aligned, mirrored)

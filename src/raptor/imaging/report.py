@@ -54,8 +54,11 @@ class MeasuredPhotograph:
             "pixels_per_l0": registration.scale * self.picture.reduction,
             "angle": registration.angle,
         }
+        mm = self.mould.mm_per_l0
+        real = {} if mm is None else {"mm_per_l0": mm, "area_mm2": self.outline.area * mm**2}
         return {
             "mould": self.mould.name,
+            **real,
             **{key: value if isfinite(value) else None for key, value in values.items()},
             "tissue": self.measurement.tissue.value,
             "registration": registration.method,

@@ -194,6 +194,14 @@ class Mould:
         if room < 1e-6 and self.depression.area < 1e-6:
             raise RaptorError(f"{self.name}: the tethers cover the depression; nothing is left to cast")
 
+    def in_millimetres(self, layers: int | None = None) -> str:
+        """What it measures in millimetres, and how deep so many layers are; "" if it has no real unit."""
+        if self.mm_per_l0 is None:
+            return ""
+        x0, y0, x1, y1 = (value * self.mm_per_l0 for value in self.outline.bounds)
+        deep = "" if layers is None else f", {layers} layers are {depth(layers) * self.mm_per_l0:.3g} mm deep"
+        return f"1 l0 is {self.mm_per_l0:.4g} mm: {x1 - x0:.4g} x {y1 - y0:.4g} mm{deep}"
+
     @cached_property
     def depression(self) -> shapely.Geometry:
         """The region that holds cells: the outline less the tethers."""
@@ -246,6 +254,11 @@ def _tether(shape: Any, name: str) -> Tether:
             f"{name}: a tether is of type {type(shape).__name__}; give a Circle or a shapely Polygon"
         )
     return shape
+
+
+def depth(layers: int) -> float:
+    """Fill height of so many layers, l0."""
+    return float(layers / np.sqrt(2))
 
 
 def require_standing(tether: Tether, outline: shapely.Polygon, what: str) -> None:

@@ -33,7 +33,7 @@ CANVAS = 65536  # pixels along the longer side: bounding boxes have single preci
 RASTER = 256  # pixels along the longer side of a shape that is looked at
 FAINTEST = 3  # of 255: the least opacity that is seen
 HIDDEN = "visibility:hidden!important"
-APPARENT = "display:inline!important;visibility:visible!important;transform:none!important"
+UNPAINTED = "display:inline!important;transform:none!important;fill:none;stroke:none"
 NO_TEXT = "text,image,foreignObject{display:none!important}"
 CLEAR = "*{opacity:1!important}"
 UNCUT = "*{clip-path:none!important;mask:none!important;filter:none!important}"
@@ -133,7 +133,7 @@ def _prepared(root: Element, page: tuple[float, float]) -> Element:
             element.set(NAME, name or "")
             element.set("id", name := f"raptor-{number}")
         taken.add(name or "")
-    document.append(Element(f"{SVG}rect", {"id": FRAME, "style": APPARENT, "width": "1", "height": "1"}))
+    document.append(Element(f"{SVG}rect", {"id": FRAME, "style": UNPAINTED, "width": "1", "height": "1"}))
     return document
 
 

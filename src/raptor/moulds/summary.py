@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import shapely
 
 from raptor.moulds.cast import cast_sites
-from raptor.moulds.geometry import Mould
+from raptor.moulds.geometry import Mould, depth
 from raptor.moulds.random_moulds import GROUPS
 from raptor.symmetry import Element
 
@@ -30,6 +30,10 @@ class Summary:
         Its class, a key of `random_moulds.GROUPS`, found from its shape.
     layers, cells : int
         Cells of so many layers cast in it.
+    mm_per_l0 : float or None
+        Millimetres per l0, where it was drawn in a real unit.
+    scaled : str
+        How a drawing was scaled.
     """
 
     mould: str
@@ -40,17 +44,24 @@ class Summary:
     symmetry: str
     layers: int
     cells: int
+    mm_per_l0: float | None = None
+    scaled: str = ""
 
     @property
     def rows(self) -> dict[str, str]:
         """What it says, by name, for people."""
+        mm = self.mm_per_l0
+        real = f" ({self.width * mm:.4g} x {self.height * mm:.4g} mm)" if mm else ""
+        deep = f" ({depth(self.layers) * mm:.3g} mm deep)" if mm else ""
+        scaled = {"scale": self.scaled} if self.scaled else {}
         return {
             "mould": self.mould,
-            "size": f"{self.width:.4g} x {self.height:.4g} l0",
+            **scaled,
+            "size": f"{self.width:.4g} x {self.height:.4g} l0{real}",
             "area": f"{self.area:.5g} l0^2",
             "tethers": f"{self.tethers}",
             "symmetry": self.symmetry.replace("_", " "),
-            "cells": f"{self.cells:,} in {self.layers} layers",
+            "cells": f"{self.cells:,} in {self.layers} layers{deep}",
         }
 
 
@@ -72,6 +83,8 @@ def summarise(mould: Mould, layers: int = 7) -> Summary:
         symmetry_class(mould),
         layers,
         len(cast_sites(mould, layers)),
+        mould.mm_per_l0,
+        mould.note,
     )
 
 

@@ -37,11 +37,7 @@ def measure(
     threshold: Threshold = None,
     landmarks: Landmarks = None,
     aligned: Aligned = False,
-    mirrored: Channel = Annotated[
-    str | None,
-    typer.Option(help="red, green, blue, saturation or hue: what tells tissue from floor [luminance]"),
-]
-Mirrored = False,
+    mirrored: Mirrored = False,
     overlay: Annotated[Path | None, typer.Option(help="picture to check by eye, PNG or SVG")] = None,
     outline: Annotated[Path | None, typer.Option(help="GeoJSON of the outline, in l0")] = None,
     as_json: opt.Json = False,

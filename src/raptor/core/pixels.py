@@ -100,7 +100,7 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
     picture = ImageOps.exif_transpose(picture)
     mode, opacity = picture.mode, None
     if mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in picture.info:
-        rgba = np.asarray(picture.convert("RGBA"), dtype=np.float64) / 255
+        rgba = _scaled(np.asarray(picture.convert("RGBA")))
         opacity, colours = rgba[..., 3], rgba[..., :3]
         colours = colours[..., :1] if mode in ("LA", "La", "L") else colours
     elif mode.startswith("I") or mode == "F":  # 16 and 32 bits of grey
@@ -108,7 +108,7 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
         colours = _scaled(values if values.dtype != np.int32 else _narrowed(values))[..., None]
     else:
         grey = mode in ("1", "L")
-        colours = np.asarray(picture.convert("L" if grey else "RGB"), dtype=np.float64) / 255
+        colours = _scaled(np.asarray(picture.convert("L" if grey else "RGB")))
         colours = colours[..., None] if grey else colours
     return Pixels(np.asarray(colours), opacity)
 
@@ -186,5 +186,5 @@ def _narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
 def _scaled(values: NDArray[Any]) -> NDArray[np.float64]:
     """Integers over the largest of their type, truth as 0 and 1; floating point as it is."""
     if values.dtype.kind in "iu":
-        return np.asarray(values / np.iinfo(values.dtype).max)
+        return np.asarray(values * (1 / np.iinfo(values.dtype).max))
     return np.asarray(values, dtype=np.float64)

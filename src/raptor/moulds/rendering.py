@@ -188,8 +188,8 @@ def _as_points(document: Element, point: tuple[float, float]) -> Element:
 
 def _text(document: Element, size: tuple[float, float], view: tuple[float, float, float, float]) -> str:
     """A picture of `size` pixels that shows the part `view` (x, y, width, height) of a document."""
-    outer = Element(f"{SVG}svg", {"width": repr(size[0]), "height": repr(size[1])})
-    outer.set("viewBox", " ".join(map(repr, view)))
+    outer = Element(f"{SVG}svg", {"width": f"{size[0]:.9g}", "height": f"{size[1]:.9g}"})
+    outer.set("viewBox", " ".join(f"{value:.9g}" for value in view))
     outer.append(document)
     return ElementTree.tostring(outer, encoding="unicode")
 
@@ -252,7 +252,7 @@ def _looks(
             shown = text.replace(f"{HIDDEN};raptor:{number};", style)
             return _alpha(shown.replace(NO_TEXT, NO_TEXT + sheet))
 
-        if opacity(f"stroke-width:{0.4 * margin:g}").max() < FAINTEST:  # a hairline is seen, too
+        if opacity(f"stroke-width:{0.4 * margin:.9f}").max() < FAINTEST:  # a hairline is seen, too
             looks.append(None)
             continue
         left = 1.0

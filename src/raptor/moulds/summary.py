@@ -1,6 +1,6 @@
 """A mould in numbers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import shapely
 
@@ -44,8 +44,8 @@ class Summary:
     symmetry: str
     layers: int
     cells: int
-    mm_per_l0: float | None = None
-    scaled: str = ""
+    mm_per_l0: float | None = field(default=None, compare=False)
+    scaled: str = field(default="", compare=False)
 
     @property
     def rows(self) -> dict[str, str]:

@@ -288,7 +288,7 @@ def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
     ):
         with pytest.raises(RaptorError, match=message):
             surrogate.predict(BOX, [parameters])
-    with pytest.raises(RaptorError, match="cast with 4 layers and 64 pixels; this model knows"):
+    with pytest.raises(RaptorError, match="cast with 4 layers and 64 pixels; this model is for"):
         surrogate.predict(CastMould(BOX, 4, 64), [])
     text = (model_folder / "model.json").read_text()
     (model_folder / "model.json").write_text(text.replace('"base_channels": 4', '"base_channels": 8'))

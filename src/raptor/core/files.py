@@ -131,7 +131,7 @@ def read_text(path: Path, what: str, expected: str) -> str:
     Raises
     ------
     RaptorError
-        As `read_input`, and where the text has another encoding.
+        As `read_input`, and if the text has another encoding.
     """
     return decoded(read_input(path, what, expected), f"{what} {path}")
 

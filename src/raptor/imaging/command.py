@@ -52,7 +52,7 @@ def measure(
     Raises
     ------
     RaptorError
-        Where the photograph or the mould cannot be read, or the tissue cannot be found.
+        If the photograph or the mould cannot be read, or the tissue cannot be found.
     """
     appearance, mould = imaging.appearance_named(look), as_mould(mould)
     if isinstance(photograph, (str, Path)):

@@ -1,1 +1,1 @@
-"""The surrogate: networks that lead from mould and parameters to the eight fields."""
+"""The surrogate: networks that predict the eight fields from a mould and three parameters."""

@@ -1,11 +1,11 @@
 """Bands about predictions, calibrated on the validation split.
 
-A band's half width is a factor times sigma, sigma^2 = deviation^2 + (irreducible size)^2: `deviation` is
-how far networks and images of D4 disagree, `size` the predicted density where fields are concerned, as the
-noise of single simulations is found where tissue is. The factor of each level is the quantile of
-|error| / sigma over the validation split (split conformal prediction; Lei et al. 2018,
-doi:10.1080/01621459.2017.1307116), so a band holds its share of all simulations that are drawn as those
-were, whatever the errors' distribution.
+A band's half width is a factor times sigma, sigma^2 = deviation^2 + (irreducible size)^2. `deviation` is
+the disagreement of networks and images of D4; for fields `size` is the predicted density, because single
+simulations are noisy where there is tissue. The factor of each level is the quantile of |error| / sigma
+over the validation split (split conformal prediction; Lei et al. 2018,
+doi:10.1080/01621459.2017.1307116), so a band covers its share of simulations from the same distribution,
+whatever the distribution of the errors.
 """
 
 import math
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from raptor.surrogate.out_of_distribution import TrainingSet
 
 LEVELS = (0.5, 0.8, 0.95)
-USUAL = 0.99  # part of the validation samples that the flag lets pass
+USUAL = 0.99  # share of the validation samples that are not flagged
 TINY = 1e-9
 
 
 @dataclass(frozen=True)
 class Bands:
-    """Half widths (levels, ...) of bands that hold `LEVELS` of all simulations."""
+    """Half widths (levels, ...) of bands that cover the shares `LEVELS` of simulations."""
 
     half: NDArray[np.float32]
 
@@ -35,12 +35,12 @@ class Bands:
 
 @dataclass(frozen=True)
 class ErrorScale:
-    """From the deviation of networks to bands, of several quantities (n,).
+    """Converts the deviation of networks to bands, for several quantities (n,).
 
     Parameters
     ----------
     irreducible : tuple of float
-        Part of sigma that no agreement of networks takes away, over `size`.
+        Part of sigma that remains if all networks agree, over `size`.
     factors : tuple (levels, n)
         Half width of each level's band over sigma.
     """
@@ -57,19 +57,19 @@ class ErrorScale:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was learnt of a surrogate's errors on the validation split.
+    """Calibration of a surrogate's errors on the validation split.
 
     Parameters
     ----------
     fields, ratios : ErrorScale
         Of the eight fields, and of A/A0 and w/w0.
     usual_disagreement : float
-        Of networks (`disagreement`), that all but a hundredth of the validation samples stay below.
+        Of networks (`disagreement`): the value that 99 % of the validation samples stay below.
     training : TrainingSet
-        To which the distance of inputs is measured.
+        The training set, to which the distance of inputs is measured.
     threshold_factor : float
-        Of the density above which there is tissue: predicted rims are softer, so that the simulations'
-        threshold lies farther out in them.
+        Factor of the density above which there is tissue: predicted edges are blurred, which moves the
+        contour at the simulations' threshold outwards.
     """
 
     fields: ErrorScale
@@ -79,11 +79,11 @@ class Calibration:
     threshold_factor: float = 1.0
 
     def relative_disagreement(self, deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
-        """`disagreement` over what is usual."""
+        """`disagreement` over its usual value."""
         return disagreement(deviation, fields) / self.usual_disagreement
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in model.json; the points of the training set stand beside the weights."""
+        """As stored in model.json; the points of the training set are stored with the weights."""
         return {
             "levels": LEVELS,
             "fields": asdict(self.fields),
@@ -95,7 +95,7 @@ class Calibration:
 
     @classmethod
     def from_json(cls, content: dict[str, Any], points: NDArray[np.float32]) -> "Calibration":
-        """Read back what `as_json` gave."""
+        """The inverse of `as_json`."""
         fields, ratios = (
             ErrorScale(tuple(part["irreducible"]), tuple(tuple(row) for row in part["factors"]))
             for part in (content["fields"], content["ratios"])
@@ -116,10 +116,10 @@ def disagreement(deviation: NDArray[np.floating], fields: NDArray[np.floating]) 
 def fit_scale(
     error: NDArray[np.floating], deviation: NDArray[np.floating], size: NDArray[np.floating]
 ) -> ErrorScale:
-    """The scale whose bands hold their share of errors (samples, n), of deviations and sizes alike.
+    """The scale whose bands cover their share of errors (samples, n), given deviations and sizes.
 
     `irreducible` is half the root mean square error over that of size: enough for a band where networks
-    happen to agree, not so much that disagreement counts for nothing. NaN are left out.
+    happen to agree, and little enough that disagreement matters. NaN are ignored.
     """
     squares = [np.nanmean(part.astype(np.float64) ** 2, axis=0) for part in (error, size)]
     irreducible = 0.5 * np.sqrt(squares[0] / (squares[1] + TINY))
@@ -129,7 +129,7 @@ def fit_scale(
 
 
 def _conformal(ratio: NDArray[np.floating], level: float) -> float:
-    """The least of ratios (samples,) that a further one does not exceed with probability `level`."""
+    """The smallest of ratios (samples,) that a new one stays below with probability `level`."""
     ordered = np.sort(ratio[np.isfinite(ratio)])
     rank = math.ceil((len(ordered) + 1) * level)
     return float(ordered[min(rank, len(ordered)) - 1])

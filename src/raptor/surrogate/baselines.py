@@ -1,4 +1,4 @@
-"""Predictions without a network, which every network has to beat."""
+"""Predictions without a network, as baselines."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ BASELINES = ("nearest", "mean")
 
 
 def training_mean(stack: Path, examples: list[Example]) -> NDArray[np.float64]:
-    """Mean fields (8, y, x) of the augmented training examples: what a guess without inputs gives."""
+    """Mean fields (8, y, x) of the augmented training examples, the best guess without inputs."""
     total, chosen = np.zeros(()), training_examples(stack, examples)
     for sample, element in _images(stack, chosen):
         total = total + transform_sample(sample, element).fields
@@ -41,10 +41,10 @@ def training_examples(stack: Path, examples: list[Example]) -> list[Example]:
 
 @dataclass(frozen=True)
 class Nearest:
-    """Fields of the training example whose mould and parameters are nearest to what is asked for.
+    """Fields of the training example with the nearest mould and parameters.
 
-    The distance is Euclidean: of masks as images of `COARSE` pixels, over their mean distance in the
-    training set, and of scaled parameters over theirs.
+    The distance is Euclidean, of masks as images of `COARSE` pixels and of scaled parameters, each over its
+    mean distance in the training set.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Nearest:
     examples : list of Example
         Of the training split.
     keys : ndarray (n, numbers)
-        What examples are compared by: coarse masks, then scaled parameters.
+        Coarse masks, then scaled parameters, of each example.
     weights : ndarray (numbers,)
         Of squared differences.
     """
@@ -86,7 +86,7 @@ def baseline(name: str, stack: Path, examples: list[Example]) -> Callable[[Sampl
     Raises
     ------
     RaptorError
-        Where there is no such baseline.
+        If there is no such baseline.
     """
     if name == "nearest":
         nearest = Nearest.of(stack, examples)
@@ -109,6 +109,6 @@ def _images(stack: Path, examples: list[Example]) -> Iterator[tuple[Sample, Elem
 
 
 def _key(sample: Sample) -> NDArray[np.float32]:
-    """What examples are compared by: coarse masks, then scaled parameters, flat."""
+    """Coarse masks, then scaled parameters, as one vector."""
     inputs = scale_inputs(sample.depression, sample.tethers, sample.parameters)
     return np.concatenate([block_average(inputs[:2], COARSE).ravel(), inputs[2:, 0, 0]])

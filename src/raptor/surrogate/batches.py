@@ -1,4 +1,4 @@
-"""Examples as tensors, in batches: kept in memory where they fit, else read as they are needed."""
+"""Examples as tensors, in batches: kept in memory if they fit, otherwise read as needed."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ from raptor.fields.resample import block_average
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 MEMORY = 3 * 2**30
-"""Bytes of the processor's memory that examples may take."""
+"""Bytes of the processor's memory that examples may use."""
 
 Batch = tuple[Tensor, Tensor]
 """Scaled inputs (n, 5, y, x) and targets (n, 8, y, x)."""
@@ -27,8 +27,8 @@ Batch = tuple[Tensor, Tensor]
 class ExampleSet(Dataset[Batch]):
     """Pairs of scaled inputs (5, y, x) and targets (8, y, x), float32, of examples of one or more stacks.
 
-    Reads one sample at a time: memory does not grow with the stacks, unless `keep` is called. Rows of
-    several stacks are counted through.
+    Reads one sample at a time, so memory does not grow with the stacks unless `keep` is called. Rows of
+    several stacks are numbered consecutively.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class ExampleSet(Dataset[Batch]):
     Raises
     ------
     RaptorError
-        Where a stack cannot be read.
+        If a stack cannot be read.
     """
 
     def __init__(
@@ -82,11 +82,11 @@ class ExampleSet(Dataset[Batch]):
 
     @property
     def rows(self) -> set[int]:
-        """Rows of the stacks that the examples are images of."""
+        """Rows of the stacks from which the examples are made."""
         return {example.sample for example in self.examples}
 
     def keep(self, device: torch.device) -> None:
-        """Read every sample once and keep it on a device, where D4 then moves it."""
+        """Read every sample once and keep it on a device, where it is then transformed under D4."""
         for row in sorted(self.rows):
             inputs, target = self.read(row)
             self.kept[row] = inputs.to(device), target.to(device)
@@ -106,12 +106,12 @@ def split_examples(
     Parameters
     ----------
     splits : sequence of str
-        Split of each sample of the stacks, rows counted through them.
+        Split of each sample of the stacks, rows numbered consecutively.
 
     Raises
     ------
     RaptorError
-        Where a split has no example.
+        If a split has no example.
     """
     parts: dict[str, list[Example]] = {"train": [], "validation": []}
     for example in examples:

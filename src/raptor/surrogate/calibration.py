@@ -67,7 +67,7 @@ def calibrate(
     Raises
     ------
     RaptorError
-        Where the stack has no validation sample.
+        If the stack has no validation sample.
     """
     table = read_table(stack)
     rows = table.rows("validation")

@@ -1,4 +1,4 @@
-"""A prediction as a user asks for it."""
+"""Prediction as a user asks for it."""
 
 from functools import cache
 from pathlib import Path
@@ -12,7 +12,7 @@ from raptor.surrogate.prediction import Prediction
 
 
 def load_surrogate(path: str | Path | None = None) -> Surrogate:
-    """Load a trained surrogate, or the one that comes with the package.
+    """Load a trained surrogate, or the shipped one.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def load_surrogate(path: str | Path | None = None) -> Surrogate:
     Raises
     ------
     RaptorError
-        Where a file is missing or cut short, or the weights do not fit the model.
+        If a file is missing or truncated, or the weights do not fit the model.
     """
     return _shipped() if path is None else load(Path(path))
 
@@ -31,22 +31,22 @@ def load_surrogate(path: str | Path | None = None) -> Surrogate:
 def predict(
     mould: Mould | str | Path, cells: CellParameters, surrogate: Surrogate | str | Path | None = None
 ) -> Prediction:
-    """Predict the tissue of a mould by a surrogate, with bands that hold 50, 80 and 95 % of simulations.
+    """Predict the tissue of a mould by a surrogate, with 50, 80 and 95 % bands.
 
     Parameters
     ----------
     mould : Mould, str or Path
         A mould, or what `read_mould` reads: a name of the library, or a file.
     cells : CellParameters
-        In the range that the training set covers.
+        Within the range of the training set.
     surrogate : Surrogate, str, Path or None
-        Or the folder of one; None for the shipped surrogate.
+        A surrogate or its folder; None for the shipped one.
 
     Raises
     ------
     RaptorError
-        Where the mould cannot be read or holds no cell, a parameter is out of range, or the surrogate
-        cannot be read or is not calibrated.
+        If the mould cannot be read or holds no cell, a parameter is out of range, or the surrogate cannot
+        be read or is not calibrated.
 
     Examples
     --------

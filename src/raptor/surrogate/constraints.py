@@ -1,8 +1,8 @@
-"""What every tissue obeys, put into predictions by construction or by projection.
+"""Physical constraints on predictions, by construction or by projection.
 
-Density is nowhere negative, nowhere deeper than 5 sigma in a wall, and sums to the number of cells; the
-orientation tensor (sums of s s^T over a pixel's cells) is positive semi-definite, and its trace is the
-density. The sign of (sxsz, sysz) is spontaneous: an average speaks of magnitudes alone.
+Density is non-negative, zero deeper than 5 sigma in a wall, and sums to the number of cells; the
+orientation tensor (sums of s s^T over a pixel's cells) is positive semi-definite with the density as its
+trace. The sign of (sxsz, sysz) is spontaneous, so averages are of magnitudes.
 """
 
 import math
@@ -25,7 +25,7 @@ ROWS = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
 def reachable(depression: Tensor) -> Tensor:
     """Where density may be, (n, 1, y, x) of 0 and 1: within 5 sigma, and a pixel, of the depression.
 
-    Of a coarse image every pixel counts that holds some of it.
+    A pixel of a coarse image counts if any part of it does.
     """
     depression = (depression > 0).to(depression.dtype)
     size = pixel_size(depression.shape[-1])
@@ -37,7 +37,7 @@ def reachable(depression: Tensor) -> Tensor:
 
 
 class PhysicalFields(nn.Module):
-    """Turns eight free channels into scaled fields that obey the physics.
+    """Turns eight free channels into scaled fields that obey the constraints.
 
     Density is softplus of the first channel, where it may be, scaled to the number of cells. The tensor is
     density L L^T / tr(L L^T) with L a lower triangle made of the last six channels. Tension is free where
@@ -68,11 +68,11 @@ class PhysicalFields(nn.Module):
 
 
 def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
-    """Fields (n, 8, y, x) in physical units made to obey the physics, for networks that do not by themselves.
+    """Fields (n, 8, y, x) in physical units projected onto the constraints, for networks that violate them.
 
-    Masks are (n or 1, 1, y, x), numbers of cells (n or 1,). Negative density and density out of reach are
-    dropped and the rest scaled to the cells; negative eigenvalues of the tensor are dropped and its trace
-    scaled to the density.
+    Masks are (n or 1, 1, y, x), numbers of cells (n or 1,). Negative density and density out of reach are set
+    to zero and the rest is scaled to the cells; negative eigenvalues of the tensor are set to zero and its
+    trace is scaled to the density.
     """
     there = reachable(depression)
     density = fields[:, :1].clamp(min=0.0) * there
@@ -82,7 +82,7 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     wanted = density[image, 0, y, x]
     tensor = found[:, ROWS]
     trace = tensor.diagonal(dim1=1, dim2=2).sum(1)
-    # Few pixels need their eigenvalues known, and these cost more than all else.
+    # Eigenvalues dominate the cost, and few pixels need them.
     doubtful = ~_is_positive(found) | (trace <= SMALL)
     mended = _positive(tensor[doubtful], wanted[doubtful])
     tensor = tensor * (wanted / trace.clamp(min=SMALL))[:, None, None]
@@ -103,26 +103,25 @@ def _is_positive(found: Tensor) -> Tensor:
 
 
 def _positive(tensor: Tensor, trace: Tensor) -> Tensor:
-    """Tensors (n, 3, 3) without their negative eigenvalues, of a given trace (n,)."""
-    size = tensor.abs().amax((1, 2), keepdim=True).clamp(min=SMALL)  # tiny ones would not converge
+    """Tensors (n, 3, 3) without their negative eigenvalues, with a given trace (n,)."""
+    size = tensor.abs().amax((1, 2), keepdim=True).clamp(min=SMALL)  # tiny tensors would not converge
     values, vectors = torch.linalg.eigh((tensor / size).double())
-    values = values.clamp(min=0.0) + SMALL  # where nothing is known, all directions alike
+    values = values.clamp(min=0.0) + SMALL  # isotropic where nothing is known
     values = values * (trace / values.sum(1))[:, None]
     mended: Tensor = (vectors * values[:, None, :]) @ vectors.transpose(1, 2)
     return mended.to(tensor.dtype)
 
 
 def with_sign(fields: Tensor) -> Tensor:
-    """Means (n, 8, y, x) of predictions with signs: sxsz positive, sysz with the sign of sxsy.
+    """Means (n, 8, y, x) of predictions given signs: sxsz positive, sysz with the sign of sxsy.
 
-    Both are shortened where the tensor would not stay positive: what obeys the physics before it was
-    averaged does so after.
+    Both are shortened where the tensor would not stay positive semi-definite.
     """
     x, y = (fields[:, channel].clamp(min=0.0) for channel in (XZ, YZ))
     y = torch.where(fields[:, XY] < 0, -y, y)
     # v v^T <= szz A with A the tensor in the plane, or v^T adj(A) v <= szz det(A).
     a, b, c = fields[:, XX], fields[:, XY], fields[:, YY]
-    # A tensor of few directions has next to no determinant, and rounding must not decide.
+    # A tensor of few directions has almost no determinant, and rounding must not decide.
     room = fields[:, ZZ].clamp(min=0.0) * ((a * c - b * b).clamp(min=0.0) + ROUNDING * (a * c).abs())
     taken = c * x * x - 2 * b * x * y + a * y * y
     short = torch.where(taken > room, torch.sqrt(room / taken.clamp(min=SMALL)), 1.0)

@@ -1,4 +1,4 @@
-"""What a model costs to train and to use."""
+"""Cost of training and using a model."""
 
 import time
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ REPEATS = 5
 def costs_of(
     surrogate: Surrogate, training: Mapping[str, Any], history: pd.DataFrame
 ) -> dict[str, float | str | int]:
-    """Weights, training and milliseconds of prediction, a model.
+    """Number of weights, training time and milliseconds per prediction of a model.
 
-    One image by one member, all eight images by one member, and those by all members: to the eight fields
-    in physical units, on as many threads as torch has; medians of a few.
+    Predictions of the eight fields in physical units: one image by one network, all eight images by one
+    network, and those by all networks, on torch's threads; medians of a few.
     """
     one = replace(surrogate, members=surrogate.members[:1])
     return {
@@ -43,7 +43,7 @@ def _milliseconds(surrogate: Surrogate, *, averaged: bool) -> float:
     """Of one prediction of `MOULD`."""
     cast = surrogate.cast(read_mould(MOULD))
     times = []
-    for _ in range(REPEATS + 1):  # the first also plans
+    for _ in range(REPEATS + 1):  # the first is a warm-up
         started = time.perf_counter()
         surrogate.predict(cast, [PARAMETERS], averaged=averaged)
         times.append(1000 * (time.perf_counter() - started))

@@ -34,9 +34,9 @@ def save(
     description : mapping
         How it was trained: `training.describe`.
     identity : str
-        Hash of the training, which stands in both files.
+        Hash of the training, stored in both files.
     half : bool
-        Write weights as float16, which takes half the room and changes predictions by less than 1e-3.
+        Write weights as float16, which halves the file and changes predictions by less than 1e-3.
     """
     tensors = {
         name: value.half() if half and value.dtype == torch.float32 else value
@@ -64,12 +64,12 @@ def save(
 
 
 def read_description(folder: Path) -> dict[str, Any]:
-    """What model.json of a model's folder says.
+    """Content of model.json in a model's folder.
 
     Raises
     ------
     RaptorError
-        Where it is missing or cut short.
+        If it is missing or cut short.
     """
     try:
         content: dict[str, Any] = json.loads((Path(folder) / MODEL).read_text())
@@ -84,7 +84,7 @@ def load(folder: Path) -> Surrogate:
     Raises
     ------
     RaptorError
-        Where a file is missing or cut short, or the weights do not fit the model.
+        If a file is missing or cut short, or the weights do not fit the model.
     """
     folder = Path(folder)
     content = read_description(folder)
@@ -98,7 +98,7 @@ def load(folder: Path) -> Surrogate:
     members = [Generator(architecture, scaling) for _ in range(count)]
     try:
         if identity != content["identity"]:
-            raise RuntimeError("they are of two trainings")
+            raise RuntimeError("they come from two trainings")
         described, calibration = content["calibration"], None
         if described is not None:
             calibration = Calibration.from_json(described, tensors.pop(DESCRIPTORS).numpy())
@@ -112,7 +112,7 @@ def load(folder: Path) -> Surrogate:
 
 
 def _read_tensors(path: Path) -> tuple[dict[str, Tensor], str | None]:
-    """The tensors of a file of weights, and the identity of the training they are of."""
+    """The tensors of a file of weights, and the identity of their training."""
     try:
         with safe_open(path, framework="pt") as file:
             identity = (file.metadata() or {}).get("identity")

@@ -1,4 +1,4 @@
-"""From scaled inputs to scaled fields: a network, and the physics of its outputs."""
+"""From scaled inputs to scaled fields: a network and the physical constraints on its outputs."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from raptor.surrogate.rules import Architecture
 
 
 class Generator(nn.Module):
-    """An architecture's network; its outputs obey the physics where the network leaves that to `physical`."""
+    """An architecture's network, followed by `physical` if its channels are free."""
 
     def __init__(self, architecture: Architecture, scaling: Scaling) -> None:
         super().__init__()
@@ -21,7 +21,7 @@ class Generator(nn.Module):
         self.physical = PhysicalFields(scaling) if architecture.network in PHYSICAL else None
 
     def forward(self, inputs: Tensor, cells: Tensor, noise: Tensor | None = None) -> Tensor:
-        """Fields (n, 8, y, x) of inputs (n, 5, y, x), numbers of cells (n,) and noise (n, numbers) if any."""
+        """Fields (n, 8, y, x) from inputs (n, 5, y, x), numbers of cells (n,) and optional noise (n, k)."""
         found: Tensor = self.network(inputs) if noise is None else self.network(inputs, noise)
         if self.physical is None:
             return found
@@ -29,19 +29,19 @@ class Generator(nn.Module):
         return fields
 
     def answers(self, inputs: Tensor, cells: Tensor, count: int, stream: torch.Generator) -> Tensor:
-        """Outcomes (n, count, 8, y, x) by noise drawn from a stream, or the one mean (n, 1, 8, y, x)."""
+        """Samples (n, count, 8, y, x) with noise drawn from a stream, or the one mean (n, 1, 8, y, x)."""
         if not self.noise:
             return torch.stack([self(inputs, cells)], dim=1)
         noise = torch.randn(count, len(inputs), self.noise, generator=stream).to(inputs.device)
         return torch.stack([self(inputs, cells, each) for each in noise], dim=1)
 
     def start_from(self, weights: Mapping[str, Tensor]) -> None:
-        """Take up the weights of another network, which need not have noise where this one has.
+        """Load the weights of another network, which may lack this one's noise.
 
         Raises
         ------
         RuntimeError
-            Where they are of another architecture.
+            If they are of another architecture.
         """
         own = {
             name: value for name, value in self.state_dict().items() if name.endswith("embed.noise.weight")

@@ -33,12 +33,12 @@ BATCH = 16
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What the networks of an ensemble say of one tissue, in physical units.
+    """Predictions of the networks of an ensemble for one tissue, in physical units.
 
     Parameters
     ----------
     mean : ndarray (8, y, x)
-        Over networks and images of D4, made to obey the physics.
+        Over networks and images of D4, projected onto the physical constraints.
     deviation : ndarray (8, y, x)
         Standard deviation over networks and images, sxsz and sysz by magnitude.
     densities : ndarray (networks, y, x)
@@ -52,18 +52,18 @@ class Ensemble:
 
 @dataclass(frozen=True)
 class Surrogate:
-    """Trained networks with what is needed to use them without their data set.
+    """Trained networks with all that is needed to use them without their data set.
 
     Parameters
     ----------
     members : tuple of Generator
-        Trained alike, from seeds of their own; predictions are their mean.
+        Trained alike with different seeds; predictions are their mean.
     layers : int
         Of the tissues that they were trained on.
     pixels : int
-        Side of the images that are predicted; networks may work on block averages of these.
+        Side of the predicted images; networks may work on block averages of these.
     calibration : Calibration or None
-        How errors follow from the disagreement of the networks, where that was measured.
+        Calibration of the errors, if measured.
     """
 
     members: tuple[Generator, ...]
@@ -79,7 +79,7 @@ class Surrogate:
 
     @cached_property
     def threshold(self) -> float:
-        """Predicted density per pixel above which there is tissue: the simulated one's, calibrated."""
+        """Density per pixel above which there is predicted tissue: the simulations' threshold, calibrated."""
         factor = 1.0 if self.calibration is None else self.calibration.threshold_factor
         return factor * density_threshold(self.layers, self.pixels)
 
@@ -89,19 +89,19 @@ class Surrogate:
         return sum(parameter.numel() for parameter in self.members[0].parameters())
 
     def cast(self, mould: Mould | CastMould) -> CastMould:
-        """A mould with as many layers and pixels as the networks know; one cast so stays as it is.
+        """A mould cast with the layers and pixels of the networks; one already so cast is returned as is.
 
         Raises
         ------
         RaptorError
-            Where a cast mould has other layers or pixels.
+            If a cast mould has other layers or pixels.
         """
         if isinstance(mould, Mould):
             return CastMould(mould, self.layers, self.pixels)
         if (mould.layers, mould.pixels) != (self.layers, self.pixels):
             raise RaptorError(
                 f"{mould.mould.name} is cast with {mould.layers} layers and {mould.pixels} pixels; this "
-                f"model knows {self.layers} layers and {self.pixels} pixels"
+                f"model is for {self.layers} layers and {self.pixels} pixels"
             )
         return mould
 
@@ -115,13 +115,13 @@ class Surrogate:
         Parameters
         ----------
         averaged : bool
-            Over the eight images of D4, so that the prediction of a turned mould is the turned prediction.
+            Over the eight images of D4, so that rotating the mould rotates the prediction.
             (sxsz, sysz) have no sign of their own.
 
         Raises
         ------
         RaptorError
-            Where the mould holds no cell, or parameters are out of the range that was sampled.
+            If the mould holds no cell, or parameters are out of the range that was sampled.
         """
         cast = self.cast(mould)
         elements = Element.all() if averaged else Element.all()[:1]
@@ -132,17 +132,17 @@ class Surrogate:
         return fields
 
     def examine(self, mould: Mould | CastMould, parameters: CellParameters) -> Prediction:
-        """Predict a mould's tissue with its calibrated bands, and say how far the input is from training.
+        """Predict a mould's tissue with calibrated bands and its distance from the training set.
 
         Raises
         ------
         RaptorError
-            As `predict`, and where the surrogate is not calibrated.
+            As `predict`, and if the surrogate is not calibrated.
         """
         if self.calibration is None:
             raise RaptorError(
-                "this model's errors were not calibrated, so it cannot say how far to trust a prediction; "
-                "use the model that the workflow's rule assemble_model wrote"
+                "this model's errors were not calibrated, so it cannot give error bands; "
+                "use a model written by the workflow's rule assemble_model"
             )
         cast, calibration = self.cast(mould), self.calibration
         found = self.ensemble(cast, parameters)
@@ -178,17 +178,17 @@ class Surrogate:
     def sample(
         self, mould: Mould | CastMould, parameters: CellParameters, count: int = 8, seed: int = 0
     ) -> NDArray[np.float32]:
-        """Outcomes (count, 8, y, x) of one mould in physical units, each as a simulation might end.
+        """Samples (count, 8, y, x) of one mould's tissue in physical units, each a possible simulation.
 
-        The networks take turns; every outcome has noise and an image of D4 of its own.
+        The networks take turns; every sample has its own noise and image of D4.
 
         Raises
         ------
         RaptorError
-            As `predict`, and where the networks give one mean.
+            As `predict`, and if the networks give one mean.
         """
         if not self.architecture.noise:
-            raise RaptorError("this model gives one mean, no samples; train one with surrogate.noise")
+            raise RaptorError("this model gives one mean, not samples; train one with surrogate.noise")
         cast, stream = self.cast(mould), torch.Generator().manual_seed(seed)
         elements = [Element.from_index(int(n)) for n in torch.randint(8, (count,), generator=stream)]
         inputs, cells = self._inputs(cast, [parameters], elements)
@@ -216,15 +216,15 @@ class Surrogate:
         moved = [move_pixels(block_average(masks, pixels), element) for element in elements]
         scaled_inputs = [scale_inputs(depression, tethers, p) for p in cells for depression, tethers in moved]
         inputs = torch.from_numpy(np.stack(scaled_inputs))
-        # Fields are per pixel of the full raster, whose block averages the networks give.
+        # Fields are per pixel of the full raster; the networks give their block averages.
         return inputs, torch.full((len(inputs),), cast.n_cells * (pixels / self.pixels) ** 2)
 
     def _answers(
         self, cast: CastMould, cells: Sequence[CellParameters], elements: Sequence[Element]
     ) -> Tensor:
-        """What each network says of each image under D4, moved back: (n, members, elements, 8, y', x').
+        """Prediction of each network for each image under D4, moved back: (n, members, elements, 8, y', x').
 
-        In physical units, on the networks' raster. Networks that sample say one outcome of each.
+        In physical units, on the networks' raster. Networks that sample give one sample of each.
         """
         inputs, counts = self._inputs(cast, cells, elements)
         parts = list(zip(torch.split(inputs, BATCH), torch.split(counts, BATCH), strict=True))
@@ -240,11 +240,11 @@ class Surrogate:
         return torch.stack(back, dim=2)
 
     def _finish(self, means: Tensor, cast: CastMould) -> NDArray[np.float32]:
-        """Fields (n, 8, y, x) of the whole raster from means (n, 8, y', x') of magnitudes."""
+        """Fields (n, 8, y, x) at full resolution from means (n, 8, y', x') of magnitudes."""
         return self._obey(with_sign(deconvolve(means, self.pixels)), cast)
 
     def _obey(self, fields: Tensor, cast: CastMould) -> NDArray[np.float32]:
-        """Fields (n, 8, y, x) of the whole raster, projected onto the physics unless they obey already."""
+        """Fields (n, 8, y, x) at full resolution, projected onto the constraints unless they obey them."""
         if self.members[0].physical is None or self.architecture.pixels != self.pixels:
             depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
             fields = project(fields, depression, torch.tensor([float(cast.n_cells)]))

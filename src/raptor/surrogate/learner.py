@@ -13,7 +13,7 @@ from raptor.surrogate.networks import Discriminator
 from raptor.surrogate.rules import Architecture, TrainingRules
 
 SAMPLES = 2
-"""Outcomes that a network with noise draws of every example in a step."""
+"""Samples that a network with noise draws for every example in a step."""
 
 LOSSES = ("generator_loss", "reconstruction_loss", "discriminator_loss")
 
@@ -41,7 +41,7 @@ class Learner:
         networks: dict[str, nn.Module] = {"generator": self.generator}
         if rules.adversarial:
             networks["discriminator"] = Discriminator(architecture.pixels, architecture.base_channels)
-        # Convolutions on a GPU's tensor cores want the channels together.
+        # Tensor cores need channels last for convolutions.
         layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
         for network in networks.values():
             network.to(device=device, memory_format=layout)  # type: ignore[call-overload]
@@ -52,7 +52,7 @@ class Learner:
         }
 
     def start_epoch(self, epoch: int) -> None:
-        """Set networks to training, and the learning rate: constant, then linearly to zero."""
+        """Set training mode and the learning rate: constant, then linearly to zero."""
         rate = self.rules.learning_rate * min(1.0, 2 * (1 - epoch / self.rules.epochs))
         for name, network in self.networks.items():
             network.train()
@@ -60,7 +60,7 @@ class Learner:
                 group["lr"] = rate
 
     def step(self, inputs: Tensor, target: Tensor) -> Tensor:
-        """Improve the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
+        """Update the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
         cells = cells_of(target, self.scaling)
         if self.generator.noise:
             noise = torch.randn(SAMPLES * len(inputs), self.generator.noise, device=inputs.device)
@@ -87,7 +87,7 @@ class Learner:
         return torch.stack([total, reconstruction, adversary]).detach().double()
 
     def _evaluate(self, name: str, *images: Tensor) -> Tensor:
-        """A network's answer, computed in the precision of the rules, in float32."""
+        """A network's output in float32, computed in the precision of the rules."""
         half = self.rules.precision == "bfloat16"
         with torch.autocast(images[0].device.type, torch.bfloat16, enabled=half):
             found: Tensor = self.networks[name](*images)
@@ -107,12 +107,12 @@ class Learner:
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Take up what `state_dict` gave."""
+        """Load what `state_dict` returned."""
         for name, network in self.networks.items():
             network.load_state_dict(state["networks"][name])
             self.optimisers[name].load_state_dict(state["optimisers"][name])
 
 
 def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:
-    """Numbers of cells (n,) that scaled fields (n, 8, y, x) hold: the sum of their density."""
+    """Numbers of cells (n,) in scaled fields (n, 8, y, x): the sum of their density."""
     return (fields[:, 0].double() * scaling.scale[0] + scaling.offset[0]).sum((1, 2)).float()

@@ -1,4 +1,4 @@
-"""How far a mould and its parameters are from the training set."""
+"""Distance of a mould and its parameters from the training set."""
 
 import math
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ DESCRIPTORS = (
 def descriptors(
     depression: NDArray[np.generic], tethers: NDArray[np.generic], parameters: CellParameters
 ) -> NDArray[np.float64]:
-    """Numbers (`DESCRIPTORS`,) that say what a mould (masks (y, x)) and its parameters are like.
+    """Descriptors (`DESCRIPTORS`,) of a mould (masks (y, x)) and its parameters.
 
-    They do not change when the mould is turned or mirrored. Parameters over the width of their range,
-    lengths in l0, areas as lengths of a square; slenderness is the logarithm of the ratio of the
-    depression's principal axes.
+    They are invariant under rotation and reflection. Parameters are over the width of their range, lengths
+    in l0, areas as the side of a square; slenderness is the logarithm of the ratio of the depression's
+    principal axes.
     """
     size = pixel_size(depression.shape[-1])
     short, long = _principal_axes(depression, size)
@@ -60,21 +60,21 @@ def _principal_axes(mask: NDArray[np.generic], size: float) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """The descriptors of a training set, to which others' distance is measured.
+    """The descriptors of a training set.
 
     Parameters
     ----------
     points : ndarray (n, descriptors)
         Of the training samples.
     usual : float
-        Distance that all but a hundredth of the validation samples stay below.
+        Distance that 99 % of the validation samples stay below.
     """
 
     points: NDArray[np.float32]
     usual: float = 1.0
 
     def distance(self, point: NDArray[np.float64]) -> float:
-        """Euclidean distance to the nearest point, each descriptor over its deviation, over what is usual."""
+        """Distance to the nearest point over the usual one, each descriptor over its deviation."""
         deviation = self.points.std(axis=0) + 1e-6
         nearest, _ = KDTree(self.points / deviation).query(point / deviation)
         return float(nearest) / self.usual

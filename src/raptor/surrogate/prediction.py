@@ -1,4 +1,4 @@
-"""What the surrogate says of one tissue, and how far to trust it."""
+"""The surrogate's prediction of one tissue, with its error bands."""
 
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ class Prediction:
     ----------
     cast : CastMould
     parameters : CellParameters
-        What was asked for.
+        Of the tissue.
     values : ndarray (8, y, x)
         The fields, in the order `symmetry.FIELDS`, per pixel.
     ratios : ndarray (2,)
@@ -36,9 +36,9 @@ class Prediction:
     ratio_bands : Bands
         Half widths (levels, 2) of those about A/A0 and w/w0.
     disagreement : float
-        Of the networks about density, over what all but a hundredth of the validation samples stay below.
+        Of the networks about density, over the value that 99 % of the validation samples stay below.
     distance : float
-        From the input to the nearest of the training set, over the same.
+        From the input to the nearest of the training set, likewise.
     threshold : float
         Density per pixel above which there is tissue in these fields.
     """
@@ -60,7 +60,7 @@ class Prediction:
 
     @property
     def layers(self) -> int:
-        """Cell layers of the simulations that the surrogate learnt from."""
+        """Cell layers of the simulations that the surrogate was trained on."""
         return self.cast.layers
 
     @property
@@ -75,19 +75,19 @@ class Prediction:
 
     @property
     def area_ratio_band(self) -> tuple[float, float]:
-        """Ends of the band about A/A0 that holds 95 % of simulations."""
+        """Ends of the 95 % band of A/A0."""
         return self._band(0)
 
     @property
     def width_ratio_band(self) -> tuple[float, float]:
-        """Ends of the band about w/w0 that holds 95 % of simulations."""
+        """Ends of the 95 % band of w/w0."""
         return self._band(1)
 
     @property
     def out_of_distribution(self) -> bool:
-        """Whether the input is unlike the training set, or the networks disagree more than they should.
+        """Whether the input is unlike the training set, or the networks disagree too much.
 
-        Bands mean nothing then: simulate.
+        The bands are then meaningless: simulate instead.
         """
         return bool(max(self.disagreement, self.distance) > 1)
 
@@ -103,12 +103,12 @@ class Prediction:
 
     @property
     def deviation(self) -> NDArray[np.float32]:
-        """Standard deviation (8, y, x) of the fields' error: 1.96 of it hold 95 % of simulations."""
+        """Standard deviation (8, y, x) of the fields' error: the half width of the 95 % band over 1.96."""
         return np.asarray(self.field_bands.half[-1] / WIDEST)
 
     @property
     def numbers(self) -> dict[str, float | int | bool | str]:
-        """What is predicted, by name; bands by half widths."""
+        """The predicted numbers by name; bands as half widths."""
         half = self.ratio_bands.half[-1]
         return {
             "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
@@ -118,14 +118,14 @@ class Prediction:
         }  # fmt: skip
 
     def to_dataset(self) -> "xr.Dataset":
-        """`fields`, each with its deviation (such as `density_std`), and the ratios' bands (level,)."""
+        """`fields`, each with its deviation (`density_std`, ...), and the ratios' bands (level,)."""
         fields = self.fields
-        share = named("share of simulations that a band holds")
+        share = named("share of simulations that a band covers")
         added: dict[str, Any] = {"level": ("level", list(LEVELS), share)}
         for name, half in zip(("area_ratio", "width_ratio"), self.ratio_bands.half.T, strict=True):
             added[f"{name}_band"] = ("level", half, named(f"half width of the band about {name}"))
         for name in ("disagreement", "distance"):
-            text = f"{name}, over what is usual; above 1 trust nothing"
+            text = f"{name}, over its usual value; above 1 do not trust the prediction"
             added[name] = ((), getattr(self, name), named(text))
         deviations = {
             f"{name}_std": (("y", "x"), image, named(f"standard deviation of the error of {name}, per pixel"))
@@ -141,7 +141,7 @@ class Prediction:
         )
         if self.out_of_distribution:
             said += (
-                "\nunlike the training set, so do not trust these bands, and simulate: "
+                "\nunlike the training set, so do not trust these bands; simulate instead: "
                 f"distance {self.distance:.1f}, disagreement {self.disagreement:.1f} (usual: below 1)"
             )
         return said

@@ -1,4 +1,4 @@
-"""What a model is and how it is trained: blocks of keys that configurations hold and the package works by."""
+"""Architecture and training of a model: blocks of configuration keys that the package uses directly."""
 
 from typing import Literal, Self
 
@@ -25,8 +25,8 @@ class Architecture(Block):
         0,
         ge=0,
         le=256,
-        description="random numbers that modulate features beside the parameters: each draw gives one "
-        "outcome of many, trained by the CRPS; 0: the network gives one mean",
+        description="random numbers that modulate features with the parameters, so that each draw gives "
+        "one sample, trained by the CRPS; 0: the network gives one mean",
     )
 
     @model_validator(mode="after")
@@ -39,9 +39,8 @@ class Architecture(Block):
 class TrainingRules(Block):
     """How a network is trained.
 
-    pix2pix trains with a learning rate of 2e-4, beta1 of 0.5, a weight of 100 on the L1 distance and a
-    discriminator. On a few dozen moulds, whose fields fill little of [-1, 1], the defaults did better on
-    validation moulds.
+    pix2pix uses a learning rate of 2e-4, beta1 of 0.5, a weight of 100 on the L1 distance and a
+    discriminator. On a few dozen moulds the defaults did better on the validation split.
     """
 
     adversarial: float = Field(
@@ -51,7 +50,7 @@ class TrainingRules(Block):
         1000.0, ge=0, description="weight of the mean absolute error of scaled fields (pix2pix: 100)"
     )
     epochs: Positive = Field(70, description="passes over the augmented examples")
-    batch_size: int = Field(4, ge=2, description="examples a step")
+    batch_size: int = Field(4, ge=2, description="examples per step")
     learning_rate: float = Field(
         1e-3, gt=0, lt=1, description="of Adam; falls linearly to zero over the second half (pix2pix: 2e-4)"
     )
@@ -65,7 +64,7 @@ class TrainingRules(Block):
 
 
 class ModelRules(TrainingRules, Architecture):
-    """A model: an ensemble of networks of one architecture, trained alike from seeds of their own."""
+    """A model: an ensemble of networks of one architecture, trained alike with different seeds."""
 
     ensemble_size: int = Field(2, ge=1, le=32, description="networks whose predictions are averaged")
     initial_weights: Name | None = Field(
@@ -74,10 +73,10 @@ class ModelRules(TrainingRules, Architecture):
     )
 
     def architecture(self, pixels: int) -> Architecture:
-        """The architecture for a data set whose images have `pixels` a side."""
+        """The architecture for a data set whose images have `pixels` per side."""
         own = {name: getattr(self, name) for name in Architecture.model_fields}
         return Architecture.model_validate(own | {"pixels": min(self.pixels, pixels)})
 
     def training(self) -> TrainingRules:
-        """The rules of training, without the rest."""
+        """The rules of training alone."""
         return TrainingRules(**{name: getattr(self, name) for name in TrainingRules.model_fields})

@@ -1,4 +1,4 @@
-"""Training of one network: resumable, repeatable, the best weights kept."""
+"""Training of one network: resumable and reproducible; keeps the best weights."""
 
 import logging
 import os
@@ -25,16 +25,16 @@ from raptor.symmetry import FIELDS
 log = logging.getLogger(__name__)
 
 SCORED = [FIELDS.index(field) for field in ("density", "sxsx", "sysy", "sxsy")]
-"""Fields of the validation error: shape and alignment. The sign of sxsz and sysz is spontaneous, and
-tension nearly cancels where nothing pulls, so their error says little of the network."""
+"""Fields of the validation error: shape and alignment. The sign of sxsz and sysz is spontaneous, and tension
+nearly cancels where nothing pulls, so their errors say little about the network."""
 
 VALIDATION_SAMPLES = 4
-"""Outcomes of each validation example, of networks that sample."""
+"""Samples of each validation example, for networks that sample."""
 
 
 @dataclass(frozen=True)
 class Trained:
-    """The generator at its best weights, on the processor, and one row an epoch."""
+    """The generator with its best weights, on the processor, and one row per epoch."""
 
     generator: Generator
     history: pd.DataFrame
@@ -53,22 +53,22 @@ def train(
     initial_weights: Mapping[str, Tensor] | None = None,
     on_progress: Callable[[int, dict[str, float]], None] = lambda epoch, row: None,
 ) -> Trained:
-    """Train, or go on from the checkpoint if it is of the same training.
+    """Train, or resume from the checkpoint if it is of the same training.
 
     Parameters
     ----------
     seed : int
-        Of first weights, order of examples and dropout. Weights are equal for equal seeds and threads.
+        Of initial weights, order of examples and dropout. Weights are equal for equal seeds and threads.
     identity : str
-        Hash of everything the training depends on; a checkpoint of another one is ignored.
+        Hash of everything that the training depends on; a checkpoint with another hash is ignored.
     initial_weights : mapping of str to Tensor, optional
-        The generator's first weights, in place of random ones: a warm restart (Loshchilov and Hutter 2017,
-        arXiv:1608.03983).
+        The generator's initial weights, instead of random ones: a warm restart (Loshchilov and Hutter
+        2017, arXiv:1608.03983).
 
     Raises
     ------
     RaptorError
-        Where a loss is no longer finite.
+        If a loss is no longer finite.
     """
     place = _prepare(rules.threads, device)
     keep_if_they_fit([training, validation], place)
@@ -92,9 +92,9 @@ def train(
 
 
 def _prepare(threads: int, device: str) -> torch.device:
-    """Set threads and operations that give the same weights every time, where torch has them."""
+    """Set threads and deterministic operations, where torch has them."""
     torch.set_num_threads(threads)
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS may not repeat itself
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # needed for reproducible cuBLAS
     torch.use_deterministic_algorithms(True, warn_only=True)
     torch.backends.cudnn.benchmark = False
     return torch.device(device)
@@ -103,13 +103,13 @@ def _prepare(threads: int, device: str) -> torch.device:
 def _resume(
     learner: Learner, checkpoint: Path, identity: str
 ) -> tuple[list[dict[str, float]], dict[str, Tensor]]:
-    """History and best weights of a checkpoint, whose state the learner takes up; both empty without one."""
+    """History and best weights of a checkpoint, whose state the learner loads; both empty without one."""
     if not checkpoint.is_file():
         return [], {}
     try:
         state = torch.load(checkpoint, map_location="cpu", weights_only=True)
     except Exception as error:
-        log.warning("checkpoint %s cannot be read (%s); training starts anew", checkpoint, error)
+        log.warning("checkpoint %s cannot be read (%s); training starts again", checkpoint, error)
         return [], {}
     if state["identity"] != identity:
         return [], {}
@@ -126,22 +126,22 @@ def _train_epoch(
     epoch: int,
     device: torch.device,
 ) -> dict[str, float]:
-    """One pass over the examples in an order of the epoch's own; returns its row of the history."""
+    """One pass over the examples in the epoch's own order; returns its row of the history."""
     started = time.perf_counter()
     torch.manual_seed(int(np.random.SeedSequence([seed, epoch]).generate_state(1)[0]))
     size = learner.rules.batch_size
     order = torch.randperm(len(training)).tolist()
     if len(order) % size == 1 and len(order) > 1:
-        order.pop()  # a batch of one has no statistics to normalise by
+        order.pop()  # batch normalisation needs more than one example
     learner.start_epoch(epoch)
     losses = torch.stack([learner.step(*batch) for batch in training.batches(order, size, device)])
-    # Read once an epoch: a GPU need not wait for the processor at every step.
+    # Read once per epoch, so that a GPU does not wait for the processor at every step.
     row = {"epoch": epoch, **dict(zip(LOSSES, losses.mean(0).tolist(), strict=True))}
     row["validation_error"] = validation_error(learner.generator, validation, size, device)
     row["seconds"] = time.perf_counter() - started
     if not np.isfinite(list(row.values())).all():
         raise RaptorError(
-            f"training broke down in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
+            f"training diverged in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
         )
     return row
 
@@ -149,11 +149,11 @@ def _train_epoch(
 def validation_error(
     generator: Generator, examples: ExampleSet, batch_size: int, device: torch.device
 ) -> float:
-    """Mean over the fields `SCORED` of the VRMSE of all examples taken together.
+    """Mean over the fields `SCORED` of the VRMSE over all examples together.
 
-    Error and variance are summed over the examples before they are divided: an example in which
-    nothing happens, and whose own variance is next to nothing, does not drown the others. Of networks
-    that sample, the CRPS stands in place of the root mean square error.
+    Error and variance are summed over the examples before division, so that an example in which nothing
+    happens, with almost no variance, does not dominate. For networks that sample, the CRPS replaces the root
+    mean square error.
     """
     generator.eval()
     power = 1 if generator.noise else 2
@@ -174,7 +174,7 @@ def validation_error(
 
 
 def joined(begun: pd.DataFrame, history: pd.DataFrame) -> pd.DataFrame:
-    """The history of a training behind that of the one that it continues, epochs counted on."""
+    """The history of a training appended to that of the one that it continues."""
     return pd.concat([begun, history.assign(epoch=history["epoch"] + len(begun))], ignore_index=True)
 
 

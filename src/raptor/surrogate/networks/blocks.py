@@ -1,7 +1,7 @@
 """Feature-wise linear modulation: parameters scale and shift every normalised channel.
 
-FiLM (E. Perez et al. 2018, arXiv:1709.07871), in place of parameters as constant images. Where noise joins
-them, a network samples outcomes (functional generative networks, Alet et al. 2025, arXiv:2506.10772).
+FiLM (E. Perez et al. 2018, arXiv:1709.07871), instead of parameters as constant images. With noise added, a
+network gives samples (functional generative networks, Alet et al. 2025, arXiv:2506.10772).
 """
 
 from torch import Tensor, nn
@@ -9,13 +9,13 @@ from torch import Tensor, nn
 from raptor.dataset.scaling import INPUTS
 
 MASKS = 2
-"""Of the input channels, images; the others are constants."""
+"""Input channels that are images; the others are constants."""
 
 EMBEDDING = 64
-"""Numbers that parameters are embedded in."""
+"""Size of the embedding of the parameters."""
 
 NOISE_WEIGHT = 0.05
-"""Deviation of the first weights of noise: little, so that a network starts from the mean that it knows."""
+"""Deviation of the initial weights of noise: small, so that a network starts from its mean."""
 
 
 class ParameterEmbedding(nn.Module):
@@ -30,7 +30,7 @@ class ParameterEmbedding(nn.Module):
             nn.init.normal_(self.noise.weight, 0.0, NOISE_WEIGHT)
 
     def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
-        """The constant images of the parameters are read at one pixel; noise is (n, numbers)."""
+        """Reads the constant images of the parameters at one pixel; noise is (n, numbers)."""
         features: Tensor = self.layers[0](inputs[:, MASKS:, 0, 0])
         if self.noise is not None:
             features = features + self.noise(noise)

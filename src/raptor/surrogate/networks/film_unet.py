@@ -1,7 +1,7 @@
 """A residual U-Net, modulated by the parameters.
 
-Squares of 2 x 2 pixels become channels, residual blocks of 3 x 3 convolutions work at four resolutions,
-and channels become squares again.
+Squares of 2 x 2 pixels become channels, residual blocks of 3 x 3 convolutions act at four resolutions, and
+channels become squares again.
 """
 
 from itertools import pairwise
@@ -70,7 +70,7 @@ class FilmUNet(nn.Module):
         nn.init.normal_(self.head.weight, 0.0, 0.01)
 
     def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
-        """Free channels; one outcome of many where there is noise (n, numbers)."""
+        """Free channels; one sample if there is noise (n, numbers)."""
         embedding = self.embed(inputs, noise)
         features = silu(self.stem(pixel_unshuffle(inputs[:, :MASKS], SQUARE), embedding))
         skips = []

@@ -14,7 +14,7 @@ MODES = 12
 
 def build(architecture: Architecture) -> nn.Module:
     """The network of an architecture."""
-    from neuralop.models import FNO  # slow to import, and other networks do without
+    from neuralop.models import FNO  # here, because it is slow to import
 
     modes = min(MODES, architecture.pixels // 2)
     operator: nn.Module = FNO(

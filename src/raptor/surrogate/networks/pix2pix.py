@@ -11,7 +11,7 @@ from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS
 
 DROPOUT = 0.5
-"""In the three deepest decoder layers."""
+"""Dropout in the three deepest decoder layers."""
 
 WIDEST = 8
 """Channels of the deepest layers, over those of the first."""
@@ -23,13 +23,13 @@ def build(architecture: Architecture) -> nn.Module:
 
 
 def build_film(architecture: Architecture) -> nn.Module:
-    """The same, but for parameters that scale and shift its features."""
+    """The same, with parameters that scale and shift its features."""
     embed = ParameterEmbedding(architecture.noise)
     return UNet(architecture.pixels, architecture.base_channels, embed)
 
 
 class Down(nn.Sequential):
-    """Halve the image: strided convolution, normalisation where there is something to average."""
+    """Halve the image: strided convolution and optional normalisation."""
 
     def __init__(
         self, before: int, after: int, *, normalise: bool, activate: bool = True, film: bool = False
@@ -58,7 +58,7 @@ class Up(nn.Sequential):
 class UNet(nn.Module):
     """A U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled.
 
-    With an embedding, parameters modulate its features, and its first layer sees the masks alone.
+    With an embedding, parameters modulate its features and its first layer sees only the masks.
     """
 
     def __init__(self, pixels: int, base_channels: int, embed: ParameterEmbedding | None = None) -> None:
@@ -97,7 +97,7 @@ class UNet(nn.Module):
 
 
 class Discriminator(nn.Module):
-    """PatchGAN: tells simulated fields from predicted ones patch by patch, given their inputs."""
+    """PatchGAN: classifies fields as simulated or predicted, patch by patch, given their inputs."""
 
     def __init__(self, pixels: int, base_channels: int) -> None:
         super().__init__()
@@ -122,7 +122,7 @@ class Discriminator(nn.Module):
 
 
 def strided_layers(pixels: int) -> int:
-    """Strided layers of a discriminator whose patches are as large a part of the image as published.
+    """Strided layers of a discriminator whose patches cover the published share of the image.
 
     3 on 256 pixels or more, where patches are 70 pixels wide; 1 on 64 or fewer, where they are 16.
     """
@@ -142,7 +142,7 @@ def initialise(network: nn.Module) -> None:
 
 
 def _through(layers: nn.Module, features: Tensor, embedding: Tensor | None) -> Tensor:
-    """Features after layers, of which some are modulated."""
+    """Features after layers, some of which are modulated."""
     for layer in layers.children():
         features = layer(features, embedding) if isinstance(layer, FilmNorm) else layer(features)
     return features

@@ -17,9 +17,9 @@ SIGMA = 3 * 125 / 512
 """Width of the Gaussian, l0 (3 pixels of the paper's 256-pixel image)."""
 
 DEEP = 5 * SIGMA
-"""How deep in a wall density may lie, l0; none lies deeper."""
+"""Largest depth of density in a wall, l0."""
 
-REACH = 6.0  # in sigma: beyond it lies 2e-9 of a cell
+REACH = 6.0  # in sigma; 2e-9 of a cell lies beyond
 
 
 @kernel
@@ -89,12 +89,12 @@ def rasterise(
     Raises
     ------
     RaptorError
-        Where the arrays disagree in length.
+        If the arrays disagree in length.
     """
     if not len(positions) == len(orientation) == len(tension):
         raise RaptorError(
             f"{len(positions)} positions, {len(orientation)} orientations and {len(tension)} "
-            "tensions given; one of each a cell is expected"
+            "tensions given; give one of each per cell"
         )
     return _image(positions, channels_of(orientation, tension), pixels)
 

@@ -71,7 +71,7 @@ print(_largest(np.ones(9)), _largest(np.ones(9, np.float32)))
     out, err = said(started("/dev/null/none", code))
     assert out == "1.0 1.0\n"
     assert err.count("\n") == 1
-    assert err.startswith("compiled kernels cannot be kept in /dev/null/none/")
+    assert err.startswith("compiled kernels cannot be stored in /dev/null/none/")
 
 
 def test_a_damaged_cache_is_replaced():

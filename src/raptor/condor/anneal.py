@@ -2,11 +2,11 @@
 
 One trial move gives one cell a new position and a new orientation and is accepted by Metropolis'
 condition. A sweep tries every cell once, a chunk of a sublattice at a time: cells of a chunk share no
-bond, so trying them at once is the same as trying them one after another. Each trial alone obeys
-detailed balance, the fixed order keeps the equilibrium distribution. Adapting the size of
-proposals to the acceptance rate between sweeps (the paper states no sizes) breaks it slightly
-while sizes change. The energy of a turn grows as Delta^2, so turns are larger than moves by a factor
-that goes as 1 / Delta.
+bond, so trying them together is equivalent to trying them one after another. Each trial obeys detailed
+balance, and the fixed order preserves the equilibrium distribution. Proposal sizes adapt to the
+acceptance rate between sweeps (the paper states no sizes), which violates balance slightly while they
+change. The energy of a rotation scales as Delta^2, so rotations are larger than moves by a factor that
+scales as 1 / Delta.
 """
 
 import math
@@ -28,10 +28,10 @@ TEMPERATURE_FACTOR = 1e7  # initial over final temperature (paper)
 TARGET_ACCEPTANCE = 0.4
 LARGEST_STEP = 0.3  # l0, of each coordinate; a proposal cannot cross a tether
 LARGEST_TURN = 2.0  # radians, about
-STIFFNESS_OF_A_CELL = 10.0  # kappa0; for the first proposals' size, which then adapts
-TURN_OVER_MOVE = 3.0  # size of turns, times Delta, over that of moves
-DRAWS = 7  # random numbers of a trial move
-ROWS = 7  # of a chunk's trial: the six of a state and the energy added
+STIFFNESS_OF_A_CELL = 10.0  # kappa0; sets the initial proposal size
+TURN_OVER_MOVE = 3.0  # size of rotations, times Delta, over that of moves
+DRAWS = 7  # random numbers per trial move
+ROWS = 7  # of a chunk's trial: six for the state and one for the energy change
 
 
 class Annealed(NamedTuple):
@@ -42,7 +42,7 @@ class Annealed(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Arrays that a sweep works in: random numbers, and the energy and state of a chunk's trials."""
+    """Work arrays of a sweep: random numbers, and the energy and state of a chunk's trials."""
 
     random: NDArray[Any]
     trial: NDArray[Any]
@@ -50,10 +50,10 @@ class _Work(NamedTuple):
 
 @kernel
 def _uniform_kernel(random, key, count):
-    """Fill an array with numbers from 0 to 1: number `count` and following of stream `key`.
+    """Fill an array with random numbers from 0 to 1: number `count` onwards of stream `key`.
 
-    SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014, doi:10.1145/2660193.2660195), which
-    finds any number of a stream without the ones before, and so all lanes at once.
+    SplitMix64 (G. Steele, D. Lea, C. Flood, OOPSLA 2014, doi:10.1145/2660193.2660195), which computes any
+    number of a stream without its predecessors, and so all lanes at once.
     """
     for i in range(random.size):
         z = key + (count + np.uint64(i)) * np.uint64(0x9E3779B97F4A7C15)
@@ -77,7 +77,7 @@ def _circle_kernel(part):
 
 @kernel
 def _propose_kernel(old, random, step, turn):
-    """New positions, uniform in a cube, and orientations, turned alike in all directions."""
+    """New positions, uniform in a cube, and orientations, rotated isotropically."""
     x, y, z, a, b, c = old
     width = random.size // DRAWS
     x = x + step * (2.0 * load(random, 0) - 1.0)
@@ -105,7 +105,7 @@ def _stretch_kernel(lx, ly, lz, a, b, c, ua, ub, uc, rest, delta):
 
 @kernel
 def _difference_kernel(state, n, room, network, chunk, old, new, delta):
-    """Energy that each trial move of a chunk would add to the bonds of its cell."""
+    """Energy change of each trial move of a chunk, over the bonds of its cell."""
     x, y, z, a, b, c = old
     nx, ny, nz, na, nb, nc = new
     difference = x * 0.0
@@ -124,7 +124,7 @@ def _difference_kernel(state, n, room, network, chunk, old, new, delta):
 
 @kernel
 def _accept_kernel(state, n, first, filled, walls, temperature, work):
-    """Metropolis' condition for each trial move of a chunk; returns how many were accepted."""
+    """Metropolis' condition for each trial move of a chunk; returns the number accepted."""
     accepted = 0
     trial, drawn = work.trial, (DRAWS - 1) * (work.random.size // DRAWS)
     for lane in range(filled):
@@ -204,7 +204,7 @@ def anneal(
     order, network
         As `build_sublattices` returns them.
     sweeps : int
-        Trial moves a cell (1e6 in the paper).
+        Trial moves per cell (1e6 in the paper).
     initial_temperature : float
         kappa0 l0^2.
     temperature_factor : float
@@ -213,7 +213,7 @@ def anneal(
     Raises
     ------
     RaptorError
-        Where the schedule makes no sense.
+        If the schedule is invalid.
     """
     if sweeps < 1 or initial_temperature <= 0 or temperature_factor < 1:
         raise RaptorError(

@@ -1,13 +1,12 @@
 """Quasi-static contraction, and its one-step draft.
 
-`contract` follows the cast lattice as the gel does: Delta rises to its value in steps. At each step
-a few sweeps of Metropolis agitate the cells, so that they leave the shallowest valleys, and then
-positions and orientations are minimised together. A bond across two cells rests at L (1 - Delta);
-the solver chooses the steps so that each shortens it by the same part of its length: large ones
-while the gel is loose, small ones where it is dense and folds easily. A step that inverted a
-bond is minimised on with contacts, which push it back; if that fails, the step is taken again with
-contacts and without agitation. Starting hot, or at the full Delta, can fold the network
-through itself; following the contraction does not.
+`contract` follows the gel from the cast lattice: Delta rises to its value in steps. At each step a few
+Metropolis sweeps agitate the cells, so that they leave the shallowest minima, and then positions and
+orientations are minimised together. A bond across two cells rests at L (1 - Delta); each step shortens it
+by the same fraction, so steps in Delta are large while the gel is loose and small where it is dense and
+folds easily. If a step inverts a bond, minimisation continues with contacts, which push it back; if that
+fails, the step is repeated with contacts and without agitation. Starting hot, or at the full Delta, can
+fold the network through itself; following the contraction does not.
 """
 
 import math
@@ -23,12 +22,12 @@ from raptor.condor.energy import inverted_fraction
 from raptor.condor.minimise import Minimum, minimise
 from raptor.condor.system import System
 
-TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2: orientations shake
-FOLDING = 0.3  # and its bound, over (1 - Delta)^2: bonds keep clear of length zero
-HOP_WARMTH = 2.0  # times the temperature of agitation
-COOLING = 10.0  # from the first to the last temperature of an agitation
+TURNING = 0.2  # temperature of agitation, kappa0 l0^2, over Delta^2, at which orientations fluctuate
+FOLDING = 0.3  # and its bound, over (1 - Delta)^2, which keeps bonds away from length zero
+HOP_WARMTH = 2.0  # temperature of a hop over that of agitation
+COOLING = 10.0  # first over last temperature of an agitation
 FEWEST_STEPS = 3  # so that orientations are agitated more than once
-CONTACT = 100.0  # kappa0, as the walls
+CONTACT = 100.0  # kappa0, like the walls
 
 
 @dataclass(frozen=True)
@@ -38,17 +37,17 @@ class Contraction:
     Parameters
     ----------
     shortening : float
-        Largest part by which one step shortens a bond's natural length; 1 takes the whole
+        Largest fraction by which one step shortens a bond's natural length; 1 takes the whole
         contraction in one step (`relax`).
     sweeps : int
-        Metropolis sweeps of each step before it is minimised.
+        Metropolis sweeps of each step before minimisation.
     ftol : float
-        A step ends when 25 more evaluations lower the energy by no more than this part; the last
-        must meet the tolerance too. Less than zero: the tolerance alone counts.
+        A step ends when 25 more evaluations lower the energy by no more than this fraction; the last
+        must meet the tolerance too. Less than zero: only the tolerance counts.
     tolerance : float
         Largest component of the gradient at the end, in kappa0 l0 times Delta.
     max_evaluations : int
-        Evaluations of the last minimisation at most.
+        Largest number of evaluations of the last minimisation.
     """
 
     shortening: float
@@ -59,18 +58,18 @@ class Contraction:
 
 
 def agitation_temperature(delta: float) -> float:
-    """Temperature at which orientations shake and few bonds fold, kappa0 l0^2.
+    """Temperature at which orientations fluctuate and few bonds fold, kappa0 l0^2.
 
-    Energies of turning grow as Delta^2; a bond of natural length l0 (1 - Delta) reverses when thermal
+    Energies of rotation scale as Delta^2; a bond of natural length l0 (1 - Delta) inverts when thermal
     motion covers that length.
     """
     return min(TURNING * delta**2, FOLDING * (1 - delta) ** 2)
 
 
 def steps_to(delta: float, shortening: float) -> NDArray[np.float64]:
-    """Values of Delta, (steps,), up to delta, each shortening 1 - Delta by the same part.
+    """Values of Delta, (steps,), up to delta, each shortening 1 - Delta by the same fraction.
 
-    That part is at most `shortening`, and there are at least `FEWEST_STEPS`.
+    The fraction is at most `shortening`, and there are at least `FEWEST_STEPS` steps.
     """
     if shortening >= 1 or delta == 0:
         return np.array([delta])
@@ -100,7 +99,7 @@ def _step(
     rng: Generator,
     last: bool,
 ) -> Minimum:
-    """One step to `delta`: agitated, minimised and, but for the one-step draft, freed of inverted bonds."""
+    """One step to `delta`: agitated, minimised and, except in the draft, freed of inverted bonds."""
     trial = state
     if contraction.sweeps:
         trial = agitate(state, system, delta, contraction.sweeps, rng)
@@ -118,7 +117,7 @@ def _without_inversion(
     contraction: Contraction,
     last: bool,
 ) -> Minimum:
-    """A minimum without inverted bonds: with contacts from there, or else from the start."""
+    """A minimum without inverted bonds, with contacts from there or else from the start."""
     used = minimum.evaluations
     for state in (minimum.state, start):
         if inverted_fraction(minimum.state, system.lattice) == 0:
@@ -178,7 +177,7 @@ def refine(
     hops: int,
     sweeps: int,
 ) -> Minimum:
-    """Agitate and minimise again and again, keeping what ends lower, converged and no more inverted.
+    """Agitate and minimise repeatedly, keeping states that are lower, converged and not more inverted.
 
     Basin hopping (D. Wales and J. Doye, J. Phys. Chem. A 101, 5111, 1997, doi:10.1021/jp970984n):
     removes boundaries between domains of orientation.

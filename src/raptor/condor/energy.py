@@ -1,16 +1,15 @@
-"""Energy of the contractile network, its gradient, and what follows from a bond's stretch.
+"""Energy of the contractile network, its gradient, tension and inverted bonds.
 
 For a bond of stiffness k, rest length L, length |l| and direction u between cells of orientation
 s_i and s_j (paper, equations 1 and 2):
 
     L' = L (1 - Delta/2 (2 - (u.s_i)^2 - (u.s_j)^2)),     E = k/2 (|l| - L')^2.
 
-Matter does not pass through itself, but springs do: where asked for, a **contact** pushes back the
-ends of a bond that are nearer than a hundredth of its rest length along its direction at casting, as
-a wall pushes back a cell.
+Springs do not stop matter from passing through itself. An optional **contact** repels the ends of a bond
+that are nearer than a hundredth of its rest length along its direction at casting, as a wall repels a cell.
 
 A state is one array of 6 blocks of `cells` numbers: x, y, z, and the three components of a vector
-along the orientation, whose length does not matter; s and -s are the same cell.
+along the orientation, of any length; s and -s are the same cell.
 """
 
 import math
@@ -27,16 +26,16 @@ from raptor.condor.walls import Walls, near_kernel, wall_energy_kernel
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 
-SOFTENING = 1e-12  # l0^2, added to |l|^2: two cells on top of each other keep a finite force
+SOFTENING = 1e-12  # l0^2, added to |l|^2, so that coincident cells have a finite force
 CONTACT_LENGTH = 0.01  # of a bond's rest length
-SMALLEST_LEVER = 0.02  # l0; for Delta near 0, where nothing moves
+SMALLEST_LEVER = 0.02  # l0; for Delta near 0
 
 
 @register_jitable
 def natural_length(rest_length, delta, squares):
-    """L' = L (1 - Delta/2 (2 - squares)): length at which a bond is at rest (paper, equation 2), l0.
+    """Length at which a bond is at rest, L' = L (1 - Delta/2 (2 - squares)) (paper, equation 2), l0.
 
-    `squares` is (u.s_i)^2 + (u.s_j)^2. Numbers, lanes of them, arrays and tensors alike.
+    `squares` is (u.s_i)^2 + (u.s_j)^2. For numbers, vector lanes, arrays and tensors.
     """
     return muladd(0.5 * rest_length * delta, squares, rest_length * (1 - delta))
 
@@ -52,7 +51,7 @@ class Scratch(NamedTuple):
 
 
 def scratch(cells: int, precision: DTypeLike = np.float64) -> Scratch:
-    """Room for evaluations of so many cells."""
+    """Work arrays for evaluations of a number of cells."""
     size = 6 * cells + 2 * lanes(precision)
     return Scratch(np.zeros(size, precision), np.zeros(size, precision))
 
@@ -139,7 +138,7 @@ def _walls_kernel(state, gradient, walls):
 
 @kernel
 def _objective_kernel(state, gradient, network, walls, delta, contact, work):
-    """Bond energy, and energy of walls and contacts, of a state; fills its gradient."""
+    """Bond energy, and energy of walls and contacts, of a state; fills the gradient."""
     n = state.size // 6
     room = (work.unit.size - 6 * n) // 2
     unit, force = work.unit[room:], work.force[room:]
@@ -154,7 +153,7 @@ def _objective_kernel(state, gradient, network, walls, delta, contact, work):
     for i in range(3 * n):
         gradient[i] = -force[i]
     for i in range(3 * n, 4 * n):
-        # dE/ds of a unit vector, as seen by a vector of any length along it.
+        # From dE/ds of the unit vector to that of a vector of any length along it.
         a, b, c = unit[i], unit[i + n], unit[i + 2 * n]
         ga, gb, gc = force[i], force[i + n], force[i + 2 * n]
         along = ga * a + gb * b + gc * c
@@ -197,12 +196,12 @@ def objective(
     state : ndarray (6 * cells,)
         x, y, z (l0) and a vector along each orientation.
     contact : float
-        Stiffness (kappa0) of contacts, whose energy counts with the walls'; 0 lets bonds reverse.
+        Stiffness (kappa0) of contacts, whose energy is counted with the walls'; 0 lets bonds invert.
 
     Raises
     ------
     RaptorError
-        Where the state does not fit the network or holds an orientation of length zero.
+        If the state does not fit the network or contains an orientation of length zero.
     """
     cells = network.cells
     if state.shape != (6 * cells,):
@@ -245,7 +244,7 @@ def coordination(lattice: Lattice) -> NDArray[np.int64]:
 
 @kernel
 def _inverted_kernel(positions, sites, first, second):
-    """Number of bonds that point against their direction at casting."""
+    """Number of inverted bonds: those that point against their direction at casting."""
     cells = sites.shape[0]
     count = 0
     for bond in range(first.size):
@@ -259,13 +258,13 @@ def _inverted_kernel(positions, sites, first, second):
 
 
 def inverted_fraction(state: NDArray[Any], lattice: Lattice) -> float:
-    """Share of bonds whose direction has reversed since casting; 0 without bonds."""
+    """Share of inverted bonds; 0 without bonds."""
     count = _inverted_kernel(state, lattice.sites, lattice.first, lattice.second)
     return float(count) / max(1, lattice.bonds)
 
 
 def inverted_share(positions: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
-    """Share of each cell's bonds that point against their direction at casting, (cells,).
+    """Share of each cell's bonds that are inverted, (cells,).
 
     `positions` are (cells, 3), l0.
     """
@@ -277,7 +276,7 @@ def inverted_share(positions: NDArray[np.float64], lattice: Lattice) -> NDArray[
 
 
 def unit_orientations(state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same state with orientations of length one."""
+    """The same state with orientations of unit length."""
     unit = state.copy()
     orientations = unit[state.size // 2 :].reshape(3, -1)
     orientations /= np.linalg.norm(orientations, axis=0)

@@ -22,7 +22,7 @@ class Lattice:
         The two cells of each bond, each bond once; grouped by direction, so that cells of
         consecutive bonds are mostly neighbours in memory.
     stiffness, rest_length : ndarray (bonds,)
-        Spring constant in kappa0 and rest length in l0; bonds without stiffness are not built.
+        Spring constant in kappa0 and rest length in l0; bonds of zero stiffness are not built.
     height : float
         Fill height, l0.
     """
@@ -46,7 +46,7 @@ class Lattice:
 
 
 def shell_offsets(distance: float) -> NDArray[np.int64]:
-    """Half of a shell's bonds as (dx, dy, dk) in half l0, half l0 and layers: one of each pair.
+    """Half of a shell's bonds, one of each pair, as (dx, dy, dk) in half l0, half l0 and layers.
 
     A face-centred-cubic site has neighbours where dx, dy (in halves) and the layer step dk have
     equal parity, at squared distance dx^2/4 + dy^2/4 + dk^2/2.
@@ -70,13 +70,13 @@ def build_lattice(mould: Mould, parameters: CellParameters, model: NetworkModel)
     Raises
     ------
     RaptorError
-        Where no site lies inside the depression.
+        If no site lies inside the depression.
     """
     return connect(cast_sites(mould, model.layers), parameters, model)
 
 
 def connect(sites: NDArray[np.float64], parameters: CellParameters, model: NetworkModel) -> Lattice:
-    """Build the bonds between sites (cells, 3) given by layer, then y, then x, as cast."""
+    """Build the bonds between cast sites (cells, 3), ordered by layer, then y, then x."""
     index = site_numbers(sites, model.layers)
     kappas = (1.0, parameters.kappa_nnn, parameters.kappa_nnnn)
     groups = [

@@ -1,11 +1,10 @@
-"""The lattice's bonds laid out for the processor's vector registers.
+"""The lattice's bonds, laid out for the processor's vector registers.
 
 Cells are ordered by layer, row and column, so neighbours of consecutive cells are mostly
 consecutive cells. A **chunk** is a run of cells that fills one register; an **entry** of a chunk
 is one register full of bonds, from cells `first` + t of the chunk to cells `second` + t, of one
-kind (spring constant, rest length and direction at casting), with a bit for each lane t that does
-hold a bond. A kernel keeps a chunk's cells in registers and goes through its entries; nothing is
-gathered one by one.
+kind (spring constant, rest length and direction at casting), with a bit for each lane t that holds a
+bond. A kernel keeps a chunk's cells in registers and loops over its entries, without gathers.
 """
 
 from typing import Any, NamedTuple
@@ -55,9 +54,9 @@ def build_sublattices(
 ) -> tuple[NDArray[np.int64], Network]:
     """Lay out a lattice for trial moves: no two cells of a chunk share a bond.
 
-    Each row of cells is taken apart into two or three interleaved sublattices. Returns the order
-    of the cells, (cells,) numbers in the lattice, and the network of the cells so ordered, which
-    holds each bond from both its ends.
+    Each row of cells is split into two or three interleaved sublattices. Returns the order of the cells,
+    (cells,) numbers in the lattice, and the network of the cells in that order, which contains each bond
+    from both ends.
     """
     row = _row(lattice)
     same = row[lattice.first] == row[lattice.second]
@@ -73,7 +72,7 @@ def build_sublattices(
 
 
 def _row(lattice: Lattice) -> NDArray[np.int64]:
-    """Number of the row that each cell was cast in."""
+    """Number of the row in which each cell was cast."""
     changes = np.diff(lattice.sites[:, 1:], axis=0).any(axis=1)
     return np.concatenate([[0], np.cumsum(changes)])
 

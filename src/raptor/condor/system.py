@@ -1,4 +1,4 @@
-"""A cast mould, laid out for the solvers."""
+"""A cast mould, prepared for the solvers."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from raptor.parameters import CellParameters, NetworkModel
 
 @dataclass(frozen=True)
 class System:
-    """Lattice, its bonds as minimisers and as trial moves take them, and the mould's walls."""
+    """Lattice, its bonds in the layouts of minimisers and of trial moves, and the mould's walls."""
 
     lattice: Lattice
     network: Network
@@ -27,12 +27,12 @@ class System:
 def build_system(
     mould: Mould, parameters: CellParameters, model: NetworkModel, precision: DTypeLike = np.float64
 ) -> System:
-    """Cast a mould and lay it out, for states of float64 or float32.
+    """Cast a mould and prepare it for states of float64 or float32.
 
     Raises
     ------
     RaptorError
-        Where the mould holds no cell.
+        If the mould holds no cell.
     """
     lattice = build_lattice(mould, parameters, model)
     walls = build_walls(mould, model.height)

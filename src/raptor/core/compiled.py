@@ -1,9 +1,9 @@
 """How kernels are compiled: the one place for Numba's flags and cache.
 
 Arithmetic is strict: no flag lets the compiler reorder a sum or fuse a product. Each compiled kernel
-carries copies of the kernels that it calls, compiled once more in their new surroundings, and of copies
-of one name a process runs the one that it met first. Strict copies give the same bits; under fast-math
-flags they did not, and a result hung on what had been compiled, loaded or called before.
+contains copies of the kernels that it calls, compiled again in their new context, and of several copies of
+one name a process runs the first that it meets. Strict copies give the same bits. Under fast-math flags
+they did not, and a result depended on what had been compiled, loaded or called before.
 """
 
 import fcntl
@@ -22,7 +22,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 
 
 def source_hash() -> str:
-    """Hash of all the package's kernel sources: what compiled code, and so a result, hangs on."""
+    """Hash of all the package's kernel sources, on which compiled code and results depend."""
     package = Path(__file__).parents[1]
     kernels = ("core/compiled.py", "raster.py", "condor/*.py")
     sources = [path for pattern in kernels for path in sorted(package.glob(pattern))]
@@ -30,10 +30,10 @@ def source_hash() -> str:
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept: NUMBA_CACHE_DIR, XDG_CACHE_HOME or ~/.cache, by `source_hash`.
+    """Folder of compiled kernels in NUMBA_CACHE_DIR, XDG_CACHE_HOME or ~/.cache, named by `source_hash`.
 
-    Numba does not see an edited helper in another file and would run the stale one; a folder named by
-    the hash of all kernel sources cannot be stale. Numba tells processors apart within it.
+    Numba does not notice an edited helper in another file and would run the stale one; a folder named by
+    the hash of all kernel sources cannot be stale. Numba separates processors within it.
     """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen) / source_hash()
@@ -48,7 +48,7 @@ CACHE_FOLDER = cache_folder()
 
 
 class _Locator(UserProvidedCacheLocator):
-    """The one folder, also where it can only be read or cannot be made."""
+    """The one folder, even if it is read-only or cannot be made."""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_Locator":
@@ -66,7 +66,7 @@ class _CacheImpl(CompileResultCacheImpl):
 
 
 class _Cache(FunctionCache):
-    """Numba's cache, shared by processes, and done without where a file cannot be read or written."""
+    """Numba's cache, shared by processes, and bypassed if a file cannot be read or written."""
 
     _impl_class = _CacheImpl
 
@@ -86,7 +86,7 @@ class _Cache(FunctionCache):
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold off other processes: two that save a kernel for two types at once mix up Numba's index."""
+    """Lock out other processes: two that save a kernel for two types at once corrupt Numba's index."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -96,8 +96,8 @@ def _locked(folder: Path) -> Iterator[None]:
 @cache
 def _warn_once(reason: str) -> None:
     logging.getLogger(__name__).warning(
-        "compiled kernels cannot be kept in %s (%s), so each process compiles them anew, for about 10 s; "
-        "set NUMBA_CACHE_DIR to a folder that can be written",
+        "compiled kernels cannot be stored in %s (%s), so each process compiles them again (about 10 s); "
+        "set NUMBA_CACHE_DIR to a writable folder",
         CACHE_FOLDER,
         reason,
     )

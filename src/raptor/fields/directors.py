@@ -1,4 +1,4 @@
-"""Directors: along which line cells of a place lie, and how strongly, from the fields of S."""
+"""Directors: the mean axis of the cells in a square, and its strength, from the fields of S."""
 
 from typing import NamedTuple
 
@@ -17,10 +17,10 @@ class Directors(NamedTuple):
     centres : ndarray (n,)
         x, and y, of the grid's squares, l0.
     angle : ndarray (n, n)
-        Of the main eigenvector of the in-plane tensor, radians from x in (-pi/2, pi/2]; (y, x).
+        Of the principal eigenvector of the in-plane tensor, radians from x in (-pi/2, pi/2]; (y, x).
     anisotropy : ndarray (n, n)
-        Difference of its two eigenvalues over density: 0 where cells lie along all lines in the plane alike
-        or upright, 1 where all lie along the director; NaN where there is no tissue.
+        Difference of its two eigenvalues over density: 0 if cells are isotropic in the plane or upright, 1 if
+        all lie along the director; NaN without tissue.
     """
 
     centres: NDArray[np.float64]
@@ -29,7 +29,7 @@ class Directors(NamedTuple):
 
 
 def directors(fields: NDArray[np.floating], threshold: float, squares: int = 32) -> Directors:
-    """Directors of fields (8, y, x), means over at most so many squares a side.
+    """Directors of fields (8, y, x), averaged over at most `squares` squares per side.
 
     Parameters
     ----------

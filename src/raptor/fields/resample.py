@@ -1,7 +1,7 @@
 """Block averages of images, and full resolution recovered from them by Fourier deconvolution.
 
-Fields are smooth over sigma = 0.732 l0, so block averages 0.98 l0 wide lose little and half as wide ones
-nothing (docs/surrogate.md): a network need not work on more pixels. numpy arrays and torch tensors alike.
+Fields are smooth over sigma = 0.732 l0, so block averages 0.98 l0 wide lose little, and half as wide ones
+nothing (docs/surrogate.md). For numpy arrays and torch tensors.
 """
 
 from functools import cache
@@ -22,9 +22,9 @@ def block_average(images: Array, pixels: int) -> Array:
 
 
 def deconvolve(images: Array, pixels: int) -> Array:
-    """The images (..., pixels, pixels), smooth and zero at the rim, whose block averages are given.
+    """Images (..., pixels, pixels), smooth and zero at the border, from their block averages.
 
-    Waves that the block averages do not resolve are taken to be absent.
+    Wave numbers that the block averages do not resolve are taken to be absent.
     """
     coarse = images.shape[-1]
     if coarse == pixels:
@@ -36,7 +36,7 @@ def deconvolve(images: Array, pixels: int) -> Array:
 
 @cache
 def deconvolution(coarse: int, pixels: int) -> NDArray[np.float64]:
-    """The matrix (pixels, coarse) that recovers one axis: waves over the averaging's transfer function."""
+    """The matrix (pixels, coarse) that recovers one axis: Fourier modes over the transfer function."""
     ratio = pixels // coarse
     waves = np.arange(1 - coarse // 2, coarse // 2)[:, None]  # periods an image
     offsets = np.arange(ratio)

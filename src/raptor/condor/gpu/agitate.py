@@ -1,8 +1,7 @@
 """Metropolis sweeps of a batch: the agitation of `raptor.condor.anneal`, one colour of cells at a time.
 
-Cells of a colour share no bond, so trying them all at once is the same as trying them one after another.
-Each tissue has its own temperature, size of proposals and stream of random numbers, so that what happens
-to it does not hang on the others.
+Cells of a colour share no bond, so trying them together is equivalent to trying them one after another.
+Each tissue has its own temperature, proposal size and random stream, so it does not depend on the others.
 """
 
 import math
@@ -33,12 +32,12 @@ def uniform(key: Tensor, count: Tensor) -> Tensor:
     z = key + count * _GOLDEN
     z = (z ^ _shifted(z, 30)) * _FIRST
     z = (z ^ _shifted(z, 27)) * _SECOND
-    # 24 bits: what a float32 holds, so that 1 itself is never drawn
+    # 24 bits, the precision of float32, so that 1 is never drawn
     return _shifted(z ^ _shifted(z, 31), 40).float() * 2.0**-24
 
 
 def _shifted(z: Tensor, bits: int) -> Tensor:
-    """Bits moved down, zeros moved in; torch's own shift repeats the sign."""
+    """Logical right shift; torch's own repeats the sign bit."""
     return (z >> bits) & ((1 << (64 - bits)) - 1)
 
 
@@ -55,7 +54,7 @@ def agitate(batch: Batch, state: Tensor, delta: Tensor, sweeps: int, key: Tensor
     delta, key : Tensor (tissues,)
         Cell-matrix interaction, more than 0, and stream of random numbers (int64) of each tissue.
     sweeps : int
-        Trial moves a cell.
+        Trial moves per cell.
     """
     flat = units(state)[0].reshape(-1).clone()
     colours = [_Colour(batch, number) for number in range(int(batch.colour.max()) + 1)]
@@ -93,7 +92,7 @@ class _Colour:
         self, flat: Tensor, delta: Tensor, temperature: Tensor, size: Tensor, turn: Tensor, key: Tensor,
         sweep: int,
     ) -> Tensor:  # fmt: skip
-        """Try each cell once, in place; returns how many each tissue accepted, (tissues,) float64."""
+        """Try each cell once, in place; returns the number accepted per tissue, (tissues,) float64."""
         batch, tissue = self.batch, self.tissue
         count = (sweep * batch.cells[tissue] + self.number) * DRAWS
         draws = [uniform(key[tissue], count + draw) for draw in range(DRAWS)]
@@ -110,12 +109,12 @@ class _Colour:
         taken = draws[DRAWS - 1] < chance  # a chance above 1 is certain
         for row in range(6):
             flat[self.cell + row * BLOCK] = torch.where(taken, new[row], old[row])
-        # Cells of a tissue stand together, in the order of tissues.
+        # Cells of a tissue are contiguous, in the order of tissues.
         return torch.segment_reduce(taken.double(), "sum", lengths=self.count, unsafe=True)
 
 
 def _proposed(old: list[Tensor], draws: list[Tensor], size: Tensor, turn: Tensor) -> list[Tensor]:
-    """New positions, uniform in a cube, and orientations, turned alike in all directions."""
+    """New positions, uniform in a cube, and orientations, rotated isotropically."""
     moved = [old[axis] + size * (2.0 * draws[axis] - 1.0) for axis in range(3)]
     upright, angle = 2.0 * draws[3] - 1.0, 2.0 * math.pi * draws[4]
     length = turn * draws[5]

@@ -1,7 +1,7 @@
-"""The contraction of many tissues: `raptor.condor.contract`, with finished tissues making room for others.
+"""The contraction of many tissues, as in `raptor.condor.contract`; finished tissues are replaced by others.
 
-Each tissue goes its own way from step to step. Those that have finished one are agitated together and
-go on; those that have finished all leave the batch, and others from the queue take their place.
+Each tissue steps at its own pace. Those that have finished a step are agitated together and continue; those
+that have finished all steps leave the batch, and others from the queue take their place.
 """
 
 import time
@@ -26,10 +26,10 @@ from raptor.core.errors import RaptorError
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters, NetworkModel
 
-TOGETHER = 0.25  # part of the tissues that must have finished a step before they are looked at
-PATIENCE = 100  # evaluations after which those that have are looked at anyway
-LOOK = 5  # evaluations between looks at who is done, for which a GPU must wait
-BYTES_A_CELL = 2000  # measured at most 1,750: neighbours, pairs, states, and copies while a batch changes
+TOGETHER = 0.25  # share of the tissues that must have finished a step before they continue
+PATIENCE = 100  # evaluations after which those that have finished continue anyway
+LOOK = 5  # evaluations between checks, for which a GPU must synchronise
+BYTES_A_CELL = 2000  # measured: up to 1,750, for neighbours, pairs, states, and copies while a batch changes
 PHASES = 3  # of a step: minimised; with contacts from there; with contacts from where the step began
 
 
@@ -82,7 +82,7 @@ class BatchSolver:
     Raises
     ------
     RaptorError
-        Where the accuracy is not one that contracts alone: draft or standard.
+        If the accuracy is not one that contracts alone: draft or standard.
     """
 
     def __init__(

@@ -45,7 +45,7 @@ def cast(mould: Mould, model: NetworkModel) -> Cast:
     Raises
     ------
     RaptorError
-        Where the mould holds no cell.
+        If the mould holds no cell.
     """
     return Cast(cast_sites(mould, model.layers), build_walls(mould, model.height))
 

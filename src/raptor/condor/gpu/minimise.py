@@ -1,8 +1,8 @@
-"""Limited-memory BFGS of many tissues in step: one evaluation of the whole batch at a time.
+"""Limited-memory BFGS of many tissues in lockstep: one evaluation of the whole batch at a time.
 
 The algorithm is that of `raptor.condor.minimise`, tissue by tissue: two loops on the dot products of the
-stored pairs, bounded steps, Armijo's condition with a parabola. Each tissue has its own step length,
-memory and stopping; a tissue whose step is refused tries again while the others go on.
+stored pairs, bounded steps, Armijo's condition with a parabola. Each tissue has its own step length, memory
+and stopping test; a tissue whose step is rejected tries again while the others continue.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ PER_BLOCK = ("state", "gradient", "direction", "pairs")  # of a minimiser; its o
 
 @dataclass
 class Goal:
-    """What each tissue is minimised to; tensors (tissues,) that a minimisation reads.
+    """The goal of each tissue's minimisation; tensors (tissues,).
 
     Parameters
     ----------
@@ -30,11 +30,11 @@ class Goal:
     tolerance : Tensor
         Largest component of the gradient, kappa0 l0 times the orientations' lever.
     ftol : Tensor
-        Part by which `WINDOW` evaluations must lower the energy; less than zero counts for nothing.
+        Fraction by which `WINDOW` evaluations must lower the energy; ignored if less than zero.
     thorough : Tensor
-        Whether both must be met, not one.
+        Whether both conditions must be met, instead of one.
     max_evaluations : Tensor
-        Evaluations at most.
+        Largest number of evaluations.
     """
 
     delta: Tensor
@@ -46,15 +46,15 @@ class Goal:
 
     @property
     def lever(self) -> Tensor:
-        """Length of the vectors that stand for orientations, l0."""
+        """Length of the vectors that represent orientations, l0."""
         return self.delta.clamp(min=SMALLEST_LEVER)
 
 
 class Minimiser:
-    """Minimises a batch in step. States are (blocks, 6, BLOCK), numbers of tissues (tissues,).
+    """Minimises a batch in lockstep. States are (blocks, 6, BLOCK), numbers of tissues (tissues,).
 
     `state`, `energy`, `wall_energy` (contacts included), `residual_gradient` (its largest component) and
-    `used` (evaluations) are the tissues' as they stand; `busy` tells whose minimisation goes on.
+    `used` (evaluations) are the tissues' current values; `busy` says which are still being minimised.
     """
 
     def __init__(self, batch: Batch, state: Tensor, goal: Goal) -> None:
@@ -79,7 +79,7 @@ class Minimiser:
         self.calm, self.busy = zeros(torch.bool), zeros(torch.bool)
 
     def take(self, chosen: Tensor) -> "Minimiser":
-        """The minimisation of the tissues chosen by a mask, as it stands."""
+        """The minimisation of the tissues selected by a mask, in its current state."""
         batch = self.batch.take(chosen)
         keep = self.batch.blocks_of(chosen)
         goal = Goal(**{name: value[chosen] for name, value in vars(self.goal).items()})
@@ -90,7 +90,7 @@ class Minimiser:
         return made
 
     def join(self, other: "Minimiser") -> "Minimiser":
-        """Two minimisations as one, both as they stand."""
+        """Two minimisations merged, both in their current state."""
         pairs = [(name, value, getattr(other.goal, name)) for name, value in vars(self.goal).items()]
         goal = Goal(**{name: torch.cat(both) for name, *both in pairs})
         made = Minimiser(join([self.batch, other.batch]), torch.cat([self.state, other.state]), goal)
@@ -100,7 +100,7 @@ class Minimiser:
         return made
 
     def start(self, chosen: Tensor) -> None:
-        """Begin anew from the present state, for the tissues chosen by a mask, at their present goal."""
+        """Restart from the current state, for the tissues selected by a mask, with their current goal."""
         batch, goal = self.batch, self.goal
         here = batch.blocks_of(chosen)[:, None, None]
         unit, _ = units(self.state)
@@ -136,7 +136,7 @@ class Minimiser:
         self.wall_energy = torch.where(taken, wall_energy, self.wall_energy)
         refused = self.busy & ~taken
         self.tries = torch.where(refused, self.tries + 1, 0)
-        # The minimum of the parabola through what is known, within bounds.
+        # The minimum of the parabola through the known values, within bounds.
         curve = total - before - self.length * self.slope
         best = -0.5 * self.slope * self.length**2 / curve.clamp(min=TINY)
         best = torch.minimum(torch.maximum(best, 0.1 * self.length), 0.5 * self.length)
@@ -151,7 +151,7 @@ class Minimiser:
         self._aim((taken | lost) & self.busy)
 
     def _judge(self, moved: Tensor) -> None:
-        """Who has reached its goal, among those whose state has changed."""
+        """Which tissues have reached their goal, among those whose state has changed."""
         goal, total = self.goal, self.energy + self.wall_energy
         look = moved & (self.used - self.looked >= WINDOW)
         calm = self.looked_at - total <= goal.ftol * total
@@ -176,7 +176,7 @@ class Minimiser:
         return move, turned
 
     def _keep(self, taken: Tensor, trial: Tensor, gradient: Tensor) -> None:
-        """Go to the trial state where it is taken, and hold the step that led there."""
+        """Accept the trial state where it qualifies, and store the step that led there."""
         batch = self.batch
         here = batch.blocks_of(taken)[:, None]
         self.newest = torch.where(taken, (self.newest + 1) % MEMORY, self.newest)
@@ -201,7 +201,7 @@ class Minimiser:
         self.held[tissue, self.newest] = torch.where(taken, sy > 1e-10 * yy, held)
 
     def _aim(self, chosen: Tensor) -> None:
-        """A new direction, its slope and a first step length, for the tissues chosen."""
+        """A new direction, its slope and an initial step length, for the selected tissues."""
         batch = self.batch
         factors, scale = self._two_loops()
         spread = factors.float()[batch.owner][:, None]
@@ -232,7 +232,7 @@ class Minimiser:
     def _two_loops(self) -> tuple[Tensor, Tensor]:
         """Factors of the pairs in - direction, (tissues, 2 MEMORY), and of the gradient, (tissues,).
 
-        A place of the ring that holds no pair has factor zero.
+        Empty places of the ring have factor zero.
         """
         back = torch.arange(MEMORY, device=self.newest.device)
         ring = (self.newest[:, None] - back) % MEMORY  # places from the newest to the oldest

@@ -91,7 +91,7 @@ def test_draw_shows_converts_and_compares(tmp_path):
     [
         (("--output", "a.jpg"), "a.jpg is no picture's name; give one that ends in .png or .svg"),
         (("--output", "nowhere/a.png"), "folder nowhere does not exist"),
-        (("--geojson", "a.svg"), "a.svg is no GeoJSON's name"),
+        (("--geojson", "a.svg"), "a.svg is not a GeoJSON file name"),
         (("--layers", 0), "layers is 0; 1 to 64 are allowed"),
         (("--scale", 0), "scale is 0.0; give a positive number"),
         (("--scale", 0.1), "tether <circle> at (-21, -7) is too thin"),
@@ -290,8 +290,8 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "give what was measured in one way"),
-        (("--tissue", "glial_1", "--area-ratio", 0.5), "give what was measured in one way"),
+        ((), "give one kind of measurement"),
+        (("--tissue", "glial_1", "--area-ratio", 0.5), "give one kind of measurement"),
         (("--tissue", "tenocyte"), "has no measured ratio to fit"),
         (("--area-ratio", 2), "a ratio to the tissue as cast lies between 0 and 1.5"),
         (("--area-ratio", 0.5, *options()), "or --by simulator"),

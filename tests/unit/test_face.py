@@ -174,7 +174,7 @@ def test_a_fit_finds_parameters_and_says_what_is_left_open(tissue, mould):
     assert found.parameters.delta == pytest.approx(0.5, abs=0.08)
     assert found.rank < 3
     assert found.numbers["delta"] == found.parameters.delta
-    assert "other parameters fit as well" in str(found)
+    assert "other parameters fit equally well" in str(found)
     assert raptor.plot(found).axes[0].get_title() == "simulator"
 
 
@@ -190,8 +190,8 @@ def test_a_fit_takes_an_outline_in_l0(mould):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "give what was measured in one way"),
-        ({"area_ratio": 0.7, "outline": "a.png"}, "give what was measured in one way"),
+        ({}, "give one kind of measurement"),
+        ({"area_ratio": 0.7, "outline": "a.png"}, "give one kind of measurement"),
         ({"area_ratio": 70}, "lies between 0 and 1.5"),
         ({"area_ratio": 0.7, "by": "eye"}, "allowed are surrogate, simulator"),
         ({"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)}, "ask it too"),

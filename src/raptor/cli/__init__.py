@@ -1,4 +1,4 @@
-"""The command line: `raptor COMMAND`, one function a command, each with an example in its help."""
+"""The command line: `raptor COMMAND`, one function per command, each with an example in its help."""
 
 import inspect
 import sys
@@ -18,7 +18,7 @@ from raptor.core.errors import RaptorError
 
 HELP = """Rapid prediction of tissue organisation: CONDOR simulations and their surrogate.
 
-Your own mould, drawn as GeoJSON, SVG or PNG (docs/moulds.md), in three steps:
+Three steps with your own mould, an SVG, DXF, GeoJSON or picture (docs/moulds.md):
 
 Example:
   raptor draw mould.svg --output mould.png
@@ -31,7 +31,7 @@ COMMANDS: tuple[Callable[..., Any], ...] = (
 
 
 def _help(text: str) -> str:
-    """Help from a docstring: paragraphs flow; an example keeps its lines, as a shell would take them."""
+    """Help from a docstring: paragraphs are reflowed; an example keeps its lines, as for a shell."""
     paragraphs = inspect.cleandoc(text).split("\n\n")
     for number, paragraph in enumerate(paragraphs):
         if paragraph.startswith("Example:"):
@@ -52,7 +52,7 @@ for command in COMMANDS:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line, or arguments in its place; bad input ends in one sentence and exit status 1."""
+    """Run the command line or the given arguments; bad input ends with one sentence and exit status 1."""
     try:
         app(arguments, prog_name="raptor")
     except RaptorError as error:

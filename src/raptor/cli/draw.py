@@ -12,21 +12,19 @@ from raptor.cli import options as opt
 
 def draw(
     mould: opt.Mould,
-    output: Annotated[Path | None, typer.Option(help="picture to write, PNG or SVG")] = None,
+    output: Annotated[Path | None, typer.Option(help="picture to write (PNG or SVG)")] = None,
     scale: opt.Scale = None,
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
     layers: opt.Layers = 7,
-    like: Annotated[
-        Path | None, typer.Option(help="another mould to compare with, drawn dashed beside the first")
-    ] = None,
-    geojson: Annotated[Path | None, typer.Option(help="GeoJSON file to convert the mould to")] = None,
+    like: Annotated[Path | None, typer.Option(help="another mould to compare with, drawn dashed")] = None,
+    geojson: Annotated[Path | None, typer.Option(help="GeoJSON file to write the mould to")] = None,
     as_json: opt.Json = False,
 ) -> None:
-    """Draw a mould as the model sees it, in numbers and a picture; convert it to GeoJSON.
+    """Draw a mould as the model sees it, print its numbers, or convert it to GeoJSON.
 
     The picture shows the frame of 62.5 l0, the outline, the tethers in red and the cells of the lowest layer.
-    Look at it before simulating a mould of your own.
+    Check it before you simulate your own mould.
 
     Example:
       raptor draw mould.svg --output mould.png
@@ -40,7 +38,7 @@ def draw(
     opt.require_picture_writable(output, mould, like, geojson)
     if geojson is not None:
         if geojson.suffix not in (".geojson", ".json"):
-            raise raptor.RaptorError(f"{geojson} is no GeoJSON's name; give one that ends in .geojson")
+            raise raptor.RaptorError(f"{geojson} is not a GeoJSON file name; give one that ends in .geojson")
         opt.require_writable(geojson, mould, like, kind="a GeoJSON file")
     shape = raptor.read_mould(mould, scale, mm_per_l0, page)
     summary = summarise(shape, raptor.NetworkModel(layers).layers)

@@ -15,8 +15,8 @@ def fit(
     mould: opt.Mould,
     output: Annotated[Path, typer.Option(help="JSON file to write")],
     area_ratio: Annotated[float | None, typer.Option(help="measured A/A0")] = None,
-    width_ratio: Annotated[float | None, typer.Option(help="measured w/w0, of the central width")] = None,
-    tissue: Annotated[str | None, typer.Option(help="tissue whose measured ratios to take")] = None,
+    width_ratio: Annotated[float | None, typer.Option(help="measured w/w0 (central width)")] = None,
+    tissue: Annotated[str | None, typer.Option(help="use the measured ratios of this tissue")] = None,
     tissues: opt.Tissues = None,
     outline: Annotated[
         Path | None,
@@ -25,7 +25,7 @@ def fit(
         ),
     ] = None,
     by: Annotated[
-        By, typer.Option(help="what a fit asks: the surrogate, or from there on CONDOR")
+        By, typer.Option(help="fit by the surrogate alone, or continue with the simulator")
     ] = "surrogate",
     model: opt.Surrogate = None,
     delta: opt.Delta = None,
@@ -35,26 +35,28 @@ def fit(
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
     layers: Annotated[
-        int | None, typer.Option(help="cell layers of simulations; without it those of the surrogate")
+        int | None, typer.Option(help="cell layers of simulations [those of the surrogate]")
     ] = None,
-    accuracy: Annotated[str, typer.Option(help="of simulations: draft, standard or reference")] = "standard",
-    simulations: Annotated[int, typer.Option(min=1, help="simulations that a fit may make")] = 40,
+    accuracy: Annotated[
+        str, typer.Option(help="accuracy of simulations: draft, standard or reference")
+    ] = "standard",
+    simulations: Annotated[int, typer.Option(min=1, help="largest number of simulations")] = 40,
     error: Annotated[
         float | None,
-        typer.Option(help="standard error of a ratio (0.01), or of the outline in l0 (0.25)"),
+        typer.Option(help="standard error of a ratio [0.01], or of the outline in l0 [0.25]"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="of every random number")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="seed of every random number")] = 0,
     picture: Annotated[
-        Path | None, typer.Option(help="picture of the tissue at the fit to write, PNG or SVG")
+        Path | None, typer.Option(help="picture of the fitted tissue to write (PNG or SVG)")
     ] = None,
     as_json: opt.Json = False,
 ) -> None:
-    """Fit delta, kappa_nnn and kappa_nnnn to a tissue in its mould, and say what is left open.
+    """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Give what was measured: one or both ratios, a tissue's name for those of the library, or a picture
-    of the tissue for its whole outline. Two ratios cannot determine three parameters: the intervals in the
-    output are those of the valley (docs/fits.md). By the simulator, the search starts at the surrogate's fit,
-    or at the parameters given, and then needs no surrogate.
+    Give one or both measured ratios, the name of a tissue of the library, or a picture of the tissue to fit
+    its whole outline. Two ratios cannot determine three parameters; the intervals in the output show what
+    they leave open (docs/fits.md). With --by simulator the search continues from the surrogate's fit, or
+    starts from given parameters without a surrogate.
 
     Example:
       raptor fit glial_1 --tissue glial_1 --output fit.json
@@ -85,7 +87,7 @@ def _measured(
     """The measured ratios of a tissue, where none are given besides."""
     tissue = raptor.tissue(name, tissues)
     if given != (None, None):
-        raise raptor.RaptorError("give what was measured in one way: ratios, --tissue NAME, or an outline")
+        raise raptor.RaptorError("give one kind of measurement: ratios, --tissue NAME, or --outline")
     if not tissue.measured:
         raise raptor.RaptorError(
             f"tissue {name} has no measured ratio to fit; give --area-ratio or --width-ratio"

@@ -1,4 +1,4 @@
-"""raptor moulds, raptor tissues: what comes with the package, by name."""
+"""raptor moulds, raptor tissues: the library of the package."""
 
 from collections.abc import Sequence
 

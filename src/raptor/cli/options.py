@@ -1,4 +1,4 @@
-"""What several commands share: arguments, parameters by flag or by tissue, results for people or scripts."""
+"""Shared by several commands: arguments, parameters by flag or by tissue, and output."""
 
 import json
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Mould = Annotated[
     Path,
-    typer.Argument(help="a mould of the library by name, or a file: SVG, DXF, GeoJSON or a picture"),
+    typer.Argument(help="library mould by name, or an SVG, DXF, GeoJSON or picture file"),
 ]
 Scale = Annotated[
     float | None,
@@ -31,27 +31,33 @@ MmPerL0 = Annotated[
 ]
 Page = Annotated[int | None, typer.Option(help="page, slice or time point of a picture that has several")]
 Delta = Annotated[float | None, typer.Option(help="cell-matrix interaction, 0 to 1")]
-KappaNNN = Annotated[float | None, typer.Option("--kappa-nnn", help="second spring constant, in kappa0")]
-KappaNNNN = Annotated[float | None, typer.Option("--kappa-nnnn", help="third spring constant, in kappa0")]
+KappaNNN = Annotated[
+    float | None, typer.Option("--kappa-nnn", help="second-shell spring constant, in kappa0")
+]
+KappaNNNN = Annotated[
+    float | None, typer.Option("--kappa-nnnn", help="third-shell spring constant, in kappa0")
+]
 Tissue = Annotated[
     str | None,
-    typer.Option(help="tissue whose fitted parameters to take, such as glial_1; a flag goes before them"),
+    typer.Option(
+        help="use the paper's fitted parameters of this tissue, such as glial_1; flags override them"
+    ),
 ]
-Tissues = Annotated[Path | None, typer.Option(help="file that describes tissues, in place of the library's")]
+Tissues = Annotated[Path | None, typer.Option(help="file of tissues, instead of the library's")]
 Surrogate = Annotated[
     Path | None,
-    typer.Option(help="folder with weights.safetensors and model.json, in place of the shipped surrogate"),
+    typer.Option(help="folder with weights.safetensors and model.json, instead of the shipped surrogate"),
 ]
 Output = Annotated[Path, typer.Option(help="netCDF file to write")]
-Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write, PNG or SVG")]
-Json = Annotated[bool, typer.Option("--json", help="print numbers as JSON, for scripts")]
+Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write (PNG or SVG)")]
+Json = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
 Layers = Annotated[int, typer.Option(help="cell layers between floor and fill height")]
 
 
 def read_mould(
     mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None, layers: int | None = None
 ) -> raptor.Mould:
-    """Read a mould, and say on standard error how it was scaled and what it measures in millimetres."""
+    """Read a mould; print its scale and size in millimetres on standard error."""
     shape = raptor.read_mould(mould, scale, mm_per_l0, page)
     said = [shape.note, shape.in_millimetres(layers)]
     if any(said):
@@ -66,12 +72,12 @@ def cell_parameters(
     tissue: str | None = None,
     tissues: Path | None = None,
 ) -> raptor.CellParameters:
-    """Parameters from flags, and for those not given from the fit of a tissue.
+    """Parameters from flags; missing ones from the fit of a tissue.
 
     Raises
     ------
     RaptorError
-        Where one is given neither way, the tissue is not known, or a value is out of bounds.
+        If one is given neither way, the tissue is unknown, or a value is out of bounds.
     """
     names = [field.name for field in fields(raptor.CellParameters)]
     values = zip(names, (delta, kappa_nnn, kappa_nnnn), strict=True)
@@ -85,17 +91,17 @@ def cell_parameters(
 
 
 def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF file") -> None:
-    """Find out before the work, not after it, that a result cannot be written.
+    """Check before the work that a result can be written.
 
     Parameters
     ----------
     others : sequence of Path or None
-        What the command reads, and writes besides: no result may take the place of these.
+        Other files that the command reads or writes, which the result must not overwrite.
 
     Raises
     ------
     RaptorError
-        Where the path is a folder or another file of the command, or its folder does not exist.
+        If the path is a folder or another file of the command, or its folder does not exist.
     """
     if output.is_dir():
         raise raptor.RaptorError(f"{output} is a folder; give the name of {kind}")
@@ -109,7 +115,7 @@ def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF f
 
 
 def require_picture_writable(picture: Path | None, *others: Path | None) -> None:
-    """As `require_writable`, for a picture, whose suffix must be one of a picture's; None is fine."""
+    """As `require_writable`, for an optional picture, whose suffix must be that of a picture."""
     if picture is not None:
         from raptor.plotting import require_picture
 
@@ -118,7 +124,7 @@ def require_picture_writable(picture: Path | None, *others: Path | None) -> None
 
 
 def save_picture(what: Any, picture: Path | None) -> None:
-    """Write a picture of what `raptor.plot` draws, where one is asked for."""
+    """Write what `raptor.plot` draws, if a picture is requested."""
     if picture is not None:
         from raptor.plotting import save_picture
 
@@ -126,7 +132,7 @@ def save_picture(what: Any, picture: Path | None) -> None:
 
 
 def finish(result: "Result", output: Path, picture: Path | None, as_json: bool) -> None:
-    """Write a tissue or a prediction and its picture, and say what it is."""
+    """Write a tissue or a prediction and its picture, and print a summary."""
     raptor.save(result, output)
     save_picture(result, picture)
     numbers = result.numbers | {"mm_per_l0": result.mould.mm_per_l0, "output": output, "picture": picture}
@@ -134,7 +140,7 @@ def finish(result: "Result", output: Path, picture: Path | None, as_json: bool) 
 
 
 def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
-    """Print a result: a sentence for people, or its numbers as one JSON object, NaN and infinity as null."""
+    """Print a result: a sentence, or its numbers as one JSON object with NaN and infinity as null."""
     if not as_json:
         typer.echo(sentence)
         return
@@ -142,7 +148,7 @@ def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
+    """A value in the types of JSON."""
     value = value.item() if hasattr(value, "item") else value  # numpy's numbers
     if isinstance(value, float) and not isfinite(value):
         return None

@@ -1,4 +1,4 @@
-"""raptor predict: one tissue by a trained surrogate, and how far to trust it."""
+"""raptor predict: one tissue by a trained surrogate, with error bands."""
 
 import raptor
 from raptor.cli import options as opt
@@ -19,9 +19,9 @@ def predict(
     picture: opt.Picture = None,
     as_json: opt.Json = False,
 ) -> None:
-    """Predict the tissue of a mould by a trained surrogate, with bands that hold 50, 80 and 95 %.
+    """Predict the tissue of a mould by a trained surrogate, with 50, 80 and 95 % bands.
 
-    Says so where mould or parameters are unlike what the surrogate was trained on.
+    Warns if mould or parameters are unlike the training set.
 
     Example:
       raptor predict four_post_rectangle

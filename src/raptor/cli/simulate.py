@@ -21,14 +21,14 @@ def simulate(
     page: opt.Page = None,
     layers: opt.Layers = 7,
     accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="of every random number")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="seed of every random number")] = 0,
     picture: opt.Picture = None,
     as_json: opt.Json = False,
 ) -> None:
-    """Simulate the tissue of a mould by CONDOR; write it, and a picture of its eight fields.
+    """Simulate the tissue of a mould with CONDOR.
 
-    Parameters come by flag, or from the paper's fit of a tissue. The file holds the fields, the mould and
-    the cells (docs/data.md).
+    Give parameters by flags or take them from the paper's fit of a tissue. The file contains the fields, the
+    mould and the cells (docs/data.md).
 
     Example:
       raptor simulate mould.svg --tissue glial_1

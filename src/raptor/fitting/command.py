@@ -183,7 +183,7 @@ def _target(
     given = {name: value for name, value in ratios.items() if value is not None}
     if bool(given) + (outline is not None) != 1:
         raise RaptorError(
-            "give what was measured in one way: the area ratio, the width ratio, both, or an outline"
+            "give one kind of measurement: the area ratio, the width ratio, both, or an outline"
         )
     for name, value in given.items():
         if not 0 < value <= LARGEST_RATIO:

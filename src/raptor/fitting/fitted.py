@@ -1,4 +1,4 @@
-"""A tissue fitted: parameters, what they make, and what is left open."""
+"""A fitted tissue: its parameters, ratios and intervals."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -18,7 +18,7 @@ from raptor.parameters import CellParameters
 
 @dataclass(frozen=True)
 class FittedTissue:
-    """A fit: what `fit` returns.
+    """A fit, as returned by `fit`.
 
     Parameters
     ----------
@@ -29,15 +29,15 @@ class FittedTissue:
         "surrogate" or "simulator".
     layers : int
     minimum : Minimum
-        The least residual sum of squares that was found.
+        The smallest residual sum of squares found.
     area_ratio, width_ratio : float
         Of the tissue there.
     intervals : dict of (float, float)
-        Ends of the 95 % interval of each parameter; empty where nothing tells.
+        Ends of the 95 % interval of each parameter; empty if unknown.
     reachable : bool or None
-        Whether any parameters give what was measured on this mould; None where nothing tells.
+        Whether any parameters reproduce the measurement on this mould; None if unknown.
     posterior : mapping
-        The posterior in numbers, as `fitting.summarise` gives it; empty where there is none.
+        The posterior in numbers, as from `fitting.summarise`; empty if there is none.
     density : ndarray (y, x)
         Of the tissue there, per pixel.
     threshold : float
@@ -59,7 +59,7 @@ class FittedTissue:
 
     @property
     def parameters(self) -> CellParameters:
-        """The parameters that fit best."""
+        """The best-fitting parameters."""
         return self.minimum.parameters
 
     @property
@@ -74,12 +74,12 @@ class FittedTissue:
 
     @property
     def distance(self) -> float | None:
-        """Root mean square distance to the outline that was measured, l0; None where ratios were."""
+        """Root mean square distance to the measured outline, l0; None for a fit to ratios."""
         return float(np.sqrt(self.rss)) if isinstance(self.target, Outline) else None
 
     @property
     def measured(self) -> Target:
-        """The ratios that were measured, each None where it was not."""
+        """The measured ratios; None if not measured."""
         return self.target if isinstance(self.target, Target) else Target(None, None)
 
     @property
@@ -100,7 +100,7 @@ class FittedTissue:
         return {**about, **asdict(self.parameters), **self._fitted, **ends, "reachable": self.reachable}
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in a file."""
+        """As stored in a file."""
         ends = {name: {"lower": low, "upper": high} for name, (low, high) in self.intervals.items()}
         content = {
             "mould": self.mould.name,
@@ -136,8 +136,8 @@ class FittedTissue:
         if self.rank < 3:
             said += (
                 f"\nonly {self.rank} combinations of the three parameters are determined: other parameters "
-                "fit as well"
+                "fit equally well"
             )
         if self.reachable is False:
-            said += "\nno parameters give what was measured on this mould, so do not trust the fit"
+            said += "\nno parameters reproduce the measurement on this mould, so do not trust the fit"
         return said

@@ -1,6 +1,7 @@
 """Slow, clear twins of every kernel: loops over cells and bonds, one formula a line."""
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -94,3 +95,73 @@ def lbfgs_direction(pairs, gradient):
     for (s, y), alpha in zip(pairs, reversed(alphas), strict=True):
         q += (alpha - y @ q / (s @ y)) * s
     return -q
+
+
+def angle(a, b, centre):
+    """By which the direction from a centre turns on the way from a to b, between -pi and pi."""
+    turn = math.atan2(b[1] - centre[1], b[0] - centre[0]) - math.atan2(a[1] - centre[1], a[0] - centre[0])
+    return (turn + math.pi) % (2 * math.pi) - math.pi
+
+
+def smallest_loop_length(plane, centre):
+    """Steps of the smallest closed path around a centre: breadth first over (site, angle turned so far)."""
+    sites = [tuple(site) for site in plane.tolist()]
+    occupied, best = set(sites), None
+    for start in sites:
+        seen, queue = {(start, 0)}, deque([(start, 0.0, 0)])
+        while queue:
+            (x, y), turned, steps = queue.popleft()
+            if best is not None and steps >= best:
+                break
+            for other in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
+                if other not in occupied:
+                    continue
+                now = turned + angle((x, y), other, centre)
+                if other == start and round(abs(now) / (2 * math.pi)) == 1:
+                    best = steps + 1
+                # Ways to one site differ by whole turns.
+                state = other, round((now - angle(start, other, centre)) / (2 * math.pi))
+                if abs(state[1]) <= 1 and state not in seen:
+                    seen.add(state)
+                    queue.append((other, now, steps + 1))
+    return best
+
+
+def held(positions, sites, loops, centre):
+    """Share of loops (numbers of sites, one a layer) whose angles still add up to one turn."""
+    around = 0
+    for loop in loops:
+        total = sum(
+            angle(positions[a], positions[b], centre) for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)
+        )
+        around += abs(round(total / (2 * math.pi))) == 1
+    return around / len(loops)
+
+
+def contact(positions, polygon, reach, points=300):
+    """Share of points along a polygon's rim that have a cell within reach."""
+    near = 0
+    for number in range(points):
+        point = polygon.exterior.interpolate(number / points, normalized=True)
+        near += min(math.dist((point.x, point.y), cell[:2]) for cell in positions) <= reach
+    return near / points
+
+
+def alignment(orientation, direction):
+    """Along a direction in the plane against across it."""
+    (ax, ay), along, across = direction, 0.0, 0.0
+    for sx, sy, _ in orientation:
+        along += (sx * ax + sy * ay) ** 2
+        across += (-sx * ay + sy * ax) ** 2
+    return (along - across) / (along + across)
+
+
+def anisotropy(fields):
+    """Difference over sum of the eigenvalues of the in-plane tensor, both summed over pixels."""
+    split, total = 0.0, 0.0
+    for row in range(fields.shape[1]):
+        for column in range(fields.shape[2]):
+            xx, yy, _, xy = fields[2:6, row, column]
+            low, high = np.linalg.eigvalsh([[xx, xy], [xy, yy]])
+            split, total = split + high - low, total + high + low
+    return split / total

@@ -57,7 +57,7 @@ def test_a_simulated_tissue_says_what_it_is(tissue, mould):
 def test_its_fields_have_names_units_masks_and_the_mould(tissue, mould):
     fields = tissue.fields(64)
     assert tuple(fields.data_vars) == FIELDS
-    assert dict(fields.sizes) == {"y": 64, "x": 64}
+    assert dict(fields.sizes) == {"y": 64, "x": 64, "tether": len(mould.tethers)}
     assert all({"units", "long_name"} <= set(fields[name].attrs) for name in fields.variables)
     assert float(fields.density.sum()) == pytest.approx(tissue.cells)
     assert np.allclose(fields.sxsx + fields.sysy + fields.szsz, fields.density)

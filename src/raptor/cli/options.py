@@ -149,6 +149,8 @@ def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
 
 def _plain(value: Any) -> Any:
     """A value in the types of JSON."""
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
     value = value.item() if hasattr(value, "item") else value  # numpy's numbers
     if isinstance(value, float) and not isfinite(value):
         return None

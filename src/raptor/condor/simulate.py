@@ -4,7 +4,6 @@ import re
 import time
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,13 +18,15 @@ from raptor.condor.minimise import Minimum
 from raptor.condor.system import System, build_system, cast_state
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
-from raptor.fields.labelled import MEASURES, labelled
+from raptor.fields.directors import anisotropy, cell_alignment
+from raptor.fields.labelled import MEASURES, TETHER_MEASURES, labelled
 from raptor.fields.shape import shape_ratios
+from raptor.fields.tethers import contact, held, posts_lost
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, NetworkModel, require_parameters
-from raptor.raster import rasterise
+from raptor.raster import density_image, rasterise
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,13 +178,38 @@ class Tissue:
 
     @property
     def area_ratio(self) -> float:
-        """A/A0; NaN where a mould of few cells lies between the pixels."""
-        return self._ratios[0]
+        """A/A0; NaN where the few cells of a mould are too sparse to be seen."""
+        return float(self._ratios[0])
 
     @property
     def width_ratio(self) -> float:
-        """w/w0 of the central section; NaN where it holds no tissue as cast."""
-        return self._ratios[1]
+        """w/w0 of the central section; NaN where it holds no tissue, as cast or as contracted."""
+        return float(self._ratios[1])
+
+    @cached_property
+    def held(self) -> NDArray[np.float64]:
+        """Share of layers in which the tissue still encircles each tether, (tethers,): see `tethers.held`."""
+        return held(self.positions, self.cast_mould)
+
+    @cached_property
+    def contact(self) -> NDArray[np.float64]:
+        """Share of each tether's rim with a cell within 1.5 l0, (tethers,)."""
+        return contact(self.positions, self.cast_mould)
+
+    @property
+    def posts_lost(self) -> int:
+        """Tethers held in fewer than half of the layers."""
+        return posts_lost(self.held)
+
+    @property
+    def alignment(self) -> float:
+        """1 where all cells lie along the mould's long side, -1 across it: see `directors.cell_alignment`."""
+        return cell_alignment(self.orientation, self.cast_mould)
+
+    @cached_property
+    def anisotropy(self) -> float:
+        """How far cells line up locally, whatever the direction, 0 to 1: see `directors.anisotropy`."""
+        return anisotropy(self.rasterised())
 
     def fields(self, pixels: int = PIXELS) -> "xr.Dataset":
         """The eight fields (y, x) per pixel, named, with masks, parameters and the mould.
@@ -205,7 +231,7 @@ class Tissue:
             self.rasterised(pixels),
             cast,
             self.parameters,
-            {name: getattr(self, name) for name in MEASURES},
+            {name: getattr(self, name) for name in MEASURES | TETHER_MEASURES},
             method="simulation",
             threshold=cast.threshold,
             accuracy=self.accuracy,
@@ -221,29 +247,27 @@ class Tissue:
         return rasterise(self.positions, self.orientation, self.tension, pixels)
 
     @cached_property
-    def _ratios(self) -> tuple[float, float]:
-        try:
-            area, width = shape_ratios(self.rasterised()[0], self.cast_mould)
-        except RaptorError:
-            return nan, nan
-        return float(area), float(width)
+    def _ratios(self) -> NDArray[np.float64]:
+        return shape_ratios(density_image(self.positions, PIXELS), self.cast_mould)
 
     @property
-    def numbers(self) -> dict[str, float | int | bool | str]:
+    def numbers(self) -> dict[str, float | int | bool | str | list[float]]:
         """What was simulated and what came of it, by name."""
         return {
             "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
             "accuracy": self.accuracy, "seed": self.seed, "cells": self.cells, "energy": self.energy,
             "converged": self.converged, "inverted_fraction": self.inverted_fraction,
-            **{name: getattr(self, name) for name in MEASURES}, "wall_time": self.wall_time,
+            **{name: getattr(self, name) for name in MEASURES},
+            **{name: getattr(self, name).tolist() for name in TETHER_MEASURES}, "wall_time": self.wall_time,
         }  # fmt: skip
 
     def __str__(self) -> str:
         state = "converged" if self.converged else "NOT converged"
+        lost = f", {self.posts_lost} of {len(self.held)} tethers lost" if self.posts_lost else ""
         return (
             f"{self.cells} cells, energy {self.energy:.4g} kappa0 l0^2, {state}, inverted "
-            f"{self.inverted_fraction:.1e}, A/A0 {self.area_ratio:.3f}, w/w0 {self.width_ratio:.3f}, "
-            f"{self.wall_time:.1f} s"
+            f"{self.inverted_fraction:.1e}, A/A0 {self.area_ratio:.3f}, w/w0 {self.width_ratio:.3f}"
+            f"{lost}, {self.wall_time:.1f} s"
         )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.frame import pixel_centres
+from raptor.moulds.cast import CastMould
 from raptor.symmetry import FIELDS
 
 
@@ -44,3 +45,40 @@ def directors(fields: NDArray[np.floating], threshold: float, squares: int = 32)
     tissue = named["density"] > threshold
     anisotropy = np.hypot(along, across) / np.where(tissue, named["density"], np.nan)
     return Directors(pixel_centres(pixels // width), 0.5 * np.arctan2(across, along), anisotropy)
+
+
+def alignment(fields: NDArray[np.floating], cast: CastMould) -> float:
+    """Alignment of cells with the mould from fields (8, y, x), -1 to 1: see `cell_alignment`."""
+    named = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
+    return _alignment(named["sxsx"], named["sysy"], named["sxsy"], cast)
+
+
+def cell_alignment(orientation: NDArray[np.float64], cast: CastMould) -> float:
+    """Alignment with the mould of cells (cells, 3): 1 where all lie along its long side, -1 across it.
+
+    The sum of (s.a)^2 - (s.b)^2 over that of (s.a)^2 + (s.b)^2, with a along the long side and b across it in
+    the plane; NaN where all cells stand upright.
+    """
+    sx, sy, _ = orientation.T
+    return _alignment(float(sx @ sx), float(sy @ sy), float(sx @ sy), cast)
+
+
+def anisotropy(fields: NDArray[np.floating]) -> float:
+    """How far cells line up locally, whatever the direction, from fields (8, y, x): 0 to 1.
+
+    The sum over pixels of sqrt((SxSx - SySy)^2 + 4 SxSy^2) over that of SxSx + SySy.
+    """
+    named = dict(zip(FIELDS, fields.astype(np.float64), strict=True))
+    sizes = np.hypot(named["sxsx"] - named["sysy"], 2 * named["sxsy"])
+    return _share(sizes.sum(), (named["sxsx"] + named["sysy"]).sum())
+
+
+def _alignment(sxsx: float, sysy: float, sxsy: float, cast: CastMould) -> float:
+    _, half = cast.long_axis
+    cosine, sine = half / np.hypot(*half)
+    along = (cosine**2 - sine**2) * (sxsx - sysy) + 4 * cosine * sine * sxsy
+    return _share(along, sxsx + sysy)
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole > 0 else float("nan")

@@ -30,7 +30,17 @@ LONG_NAMES = {
 MEASURES = {
     "area_ratio": "A/A0: area of the tissue over its area as cast",
     "width_ratio": "w/w0: width of the tissue on the central section over its width as cast",
+    "posts_lost": "number of tethers that tissue encircles in fewer than half of the layers",
+    "alignment": "alignment of cells with the long side of the mould, from -1 (across) to 1",
+    "anisotropy": "local alignment of cells in the plane, whatever the direction, from 0 to 1",
 }
+"""Numbers of a tissue."""
+
+TETHER_MEASURES = {
+    "held": "share of layers in which tissue encircles the tether",
+    "contact": "share of the rim of the tether that has a cell within 1.5 l0",
+}
+"""Numbers of each tether; `held` is NaN at a tether that touches the outline."""
 
 
 def labelled(
@@ -49,7 +59,7 @@ def labelled(
     Parameters
     ----------
     measures : mapping
-        Numbers of `MEASURES`, by name.
+        Numbers of `MEASURES` and of `TETHER_MEASURES`, by name.
     attributes : Any
         Further attributes of the Dataset, such as `threshold`.
 
@@ -67,7 +77,7 @@ def labelled(
         "tethers": (plane, cast.tethers, named("whether a tether stands there")),
     }
     numbers = {
-        name: ((), value, named((PARAMETERS | MEASURES)[name]))
+        name: (("tether",) * np.ndim(value), value, named((PARAMETERS | MEASURES | TETHER_MEASURES)[name]))
         for name, value in {**asdict(parameters), **measures}.items()
     }
     return xr.Dataset(

@@ -16,7 +16,7 @@ from raptor.core.errors import RaptorError
 from raptor.fitting.targets import Measure, Target, parameters_at
 from raptor.parameters import CellParameters
 
-STEP = 0.02  # of a finite difference, over a bound's width: the area counts whole pixels
+STEP = 0.02  # of a finite difference, over a bound's width
 REFINED = 4  # of the points that a search starts from
 MOST_STEPS = 30
 WITHIN = (1e-6, 1 - 1e-6)  # SciPy asks for a start within the bounds

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.condor.simulate import Tissue
+from raptor.fields.directors import alignment
 from raptor.fields.shape import section_ratio, shape_ratios
 from raptor.fitting.targets import RATIOS
 from raptor.moulds.cast import CastMould
@@ -58,18 +59,14 @@ CANDIDATES = (
 def seen(fields: NDArray[np.floating], cast: CastMould, threshold: float) -> NDArray[np.float64]:
     """What the eight fields (8, y, x) of a tissue show of `SEEN`, (8,).
 
-    Widths are w/w0 on pairs of sections at `STATIONS` to both sides of the centre. alignment is the mean
-    over cells of (s.a)^2 - (s.b)^2, a along the mould's long side and b across it, upright that of (s.z)^2;
-    tension is the mean over cells, kappa0 l0.
+    Widths are w/w0 on pairs of sections at `STATIONS` to both sides of the centre. alignment is
+    `directors.alignment`, upright the mean over cells of (s.z)^2, tension the mean over cells, kappa0 l0.
     """
     density = fields[0]
     sums = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
-    _, half = cast.long_axis
-    cosine, sine = half / np.hypot(*half)
-    along = (cosine**2 - sine**2) * (sums["sxsx"] - sums["sysy"]) + 4 * cosine * sine * sums["sxsy"]
     widths = [section_ratio(density, cast, cast.sections((-p, p)), threshold) for p in STATIONS]
-    means = [value / sums["density"] for value in (along, sums["szsz"], sums["tension"])]
-    return np.array([*shape_ratios(density, cast, threshold), *widths, *means])
+    means = [sums[name] / sums["density"] for name in ("szsz", "tension")]
+    return np.array([*shape_ratios(density, cast, threshold), *widths, alignment(fields, cast), *means])
 
 
 def thickness_ratio(simulation: Tissue) -> float:

@@ -127,7 +127,9 @@ def survey(surrogate: "Surrogate", mould: Mould, points: int, seed: int) -> Surv
         part = parameters[start : start + TOGETHER]
         fields = surrogate.predict(cast, part)
         values += [seen(each, cast, surrogate.threshold) for each in fields]
-    return Survey(units, np.array(values), np.array(bands, dtype=float) / norm.ppf(0.975))
+    found = np.array(values)
+    found[np.isnan(found) & ~np.isnan(found).all(axis=0)] = 0.0  # a tissue torn at a section has no width
+    return Survey(units, found, np.array(bands, dtype=float) / norm.ppf(0.975))
 
 
 def infer(found: Survey, target: Target, error: float, seed: int, dense: int = DENSE) -> Posterior:

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.geometry import STRICTLY, Mould
-from raptor.moulds.raster import MouldImage, mould_image
+from raptor.moulds.geometry import CLEARANCE, Mould
+from raptor.moulds.loops import centre_of, smallest_loop
+from raptor.moulds.raster import MouldImage, mould_image, tether_depth
 from raptor.raster import density_image, density_threshold
 
+THIN = 4.0  # l0, 5.5 sigma
 HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond
 
 
@@ -73,6 +75,37 @@ class CastMould:
         return density_threshold(self.layers, self.pixels)
 
     @cached_property
+    def tether_depths(self) -> NDArray[np.float64]:
+        """Depth of pixel centres in each tether (tethers, y, x), l0; -inf far outside."""
+        depths = [tether_depth(tether, self.pixels, reach=1.0) for tether in self.mould.tethers]
+        return np.array(depths).reshape(-1, self.pixels, self.pixels)
+
+    @cached_property
+    def thin_tethers(self) -> NDArray[np.float64]:
+        """The same in each part of the tethers that counts as tissue where tissue encloses it (n, y, x)."""
+        polygons = [tether.polygon for tether in self.mould.tethers]
+        depths = [
+            self.tether_depths[shapely.intersects(polygons, part)].max(axis=0)
+            for part in thin_parts(self.mould)
+        ]
+        return np.array(depths).reshape(-1, self.pixels, self.pixels)
+
+    @cached_property
+    def loops(self) -> list[list[NDArray[np.intp]]]:
+        """Of each tether, and in each layer where there is one, the smallest closed path of sites around it.
+
+        Numbers of sites, of one step each (`smallest_loop`).
+        """
+        starts = np.searchsorted(self.sites[:, 2], (np.arange(self.layers) + 0.25) / np.sqrt(2))
+        planes = [_plane(self.mould, 0.5 * parity) for parity in range(min(self.layers, 2))]
+        found = []
+        for tether in self.mould.tethers:
+            paths = [smallest_loop(plane, centre_of(tether)) for plane in planes]
+            of_layers = [(start, paths[layer % 2]) for layer, start in enumerate(starts)]
+            found.append([start + path for start, path in of_layers if path is not None])
+        return found
+
+    @cached_property
     def long_axis(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Centre and half of the long side, each (2,), l0: see `long_axis`."""
         return long_axis(self.mould)
@@ -86,6 +119,16 @@ class CastMould:
         """Lines parallel to the central section, at places from -1 to 1 along half of the long side."""
         centre, half = self.long_axis
         return [_across(centre + place * half, half) for place in places]
+
+
+def thin_parts(mould: Mould) -> list[shapely.Polygon]:
+    """Tethers that count as tissue where tissue encloses them: those narrower than 4 l0.
+
+    Density is blurred over such a tether, the more the denser the tissue, and who measures a photograph does
+    not cut a thin post out. Tethers that overlap are one. A tether is as wide as the largest circle in it.
+    """
+    joined = shapely.union_all([tether.polygon for tether in mould.tethers])
+    return [part for part in shapely.get_parts(joined) if part.buffer(-0.999 * THIN / 2).is_empty]
 
 
 def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
@@ -139,7 +182,7 @@ def _plane(mould: Mould, shift: float) -> NDArray[np.float64]:
     """Sites (n, 2) of one layer, l0, by y, then x."""
     axis = np.arange(-HALF_SPAN, HALF_SPAN + 1) + shift
     points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    return points[mould.forbidden_depth(points) < -STRICTLY]
+    return points[mould.forbidden_depth(points) <= -CLEARANCE]
 
 
 def _across(middle: NDArray[np.float64], half: NDArray[np.float64]) -> shapely.LineString:

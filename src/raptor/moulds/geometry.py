@@ -16,7 +16,8 @@ from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
 
 SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
-STRICTLY = 1e-9  # a site this close to a wall does not hold a cell
+CLEARANCE = 0.248  # l0; a cell stands at least a quarter inside every wall, give or take a drawing's rounding
+STRICTLY = 1e-9  # l0; a pixel's centre this close to a wall lies on it
 TOUCHING = 1e-3  # l0; how far a tether may reach out of the outline
 TOO_THIN = f"is too thin to hold cells back; make it at least {2 * SMALLEST_TETHER} l0 across"
 CIRCLE_SEGMENTS = 64  # a quarter circle, where a circle must be drawn as a polygon

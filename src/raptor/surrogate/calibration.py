@@ -48,7 +48,7 @@ class Case:
 
     def error(self, threshold: float) -> NDArray[np.float64]:
         """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
-        return shape_ratios(self.density, self.cast, threshold) - self.ratios
+        return np.nan_to_num(shape_ratios(self.density, self.cast, threshold)) - self.ratios
 
     def deviation(self, threshold: float) -> NDArray[np.float64]:
         """Standard deviation (2,) of both ratios over networks."""

@@ -1,12 +1,15 @@
 """The surrogate's prediction of one tissue, with its error bands."""
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.labelled import labelled, named
+from raptor.fields.directors import alignment, anisotropy
+from raptor.fields.labelled import MEASURES, labelled, named
+from raptor.fields.tethers import posts_lost, seen_held
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
@@ -73,6 +76,26 @@ class Prediction:
         """w/w0 of the central section; NaN where it holds no tissue as cast."""
         return float(self.ratios[1])
 
+    @cached_property
+    def held(self) -> NDArray[np.float64]:
+        """1 where the predicted tissue encloses a tether, else 0, (tethers,): see `tethers.seen_held`."""
+        return seen_held(self.values[0], self.cast, self.threshold)
+
+    @property
+    def posts_lost(self) -> int:
+        """Tethers that the predicted tissue does not enclose."""
+        return posts_lost(self.held)
+
+    @property
+    def alignment(self) -> float:
+        """1 where all cells lie along the mould's long side, -1 across it: see `directors.alignment`."""
+        return alignment(self.values, self.cast)
+
+    @property
+    def anisotropy(self) -> float:
+        """How far cells line up locally, whatever the direction, 0 to 1: see `directors.anisotropy`."""
+        return anisotropy(self.values)
+
     @property
     def area_ratio_band(self) -> tuple[float, float]:
         """Ends of the 95 % band of A/A0."""
@@ -97,7 +120,7 @@ class Prediction:
 
         See `raptor.fields.labelled` for what the Dataset holds.
         """
-        measures = {"area_ratio": self.area_ratio, "width_ratio": self.width_ratio}
+        measures = {name: getattr(self, name) for name in (*MEASURES, "held")}
         about = {"method": "prediction", "threshold": self.threshold}
         return labelled(self.values, self.cast, self.parameters, measures, **about)
 
@@ -107,13 +130,15 @@ class Prediction:
         return np.asarray(self.field_bands.half[-1] / WIDEST)
 
     @property
-    def numbers(self) -> dict[str, float | int | bool | str]:
+    def numbers(self) -> dict[str, float | int | bool | str | list[float]]:
         """The predicted numbers by name; bands as half widths."""
         half = self.ratio_bands.half[-1]
         return {
             "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
             "area_ratio": self.area_ratio, "area_ratio_band95": float(half[0]),
             "width_ratio": self.width_ratio, "width_ratio_band95": float(half[1]),
+            "posts_lost": self.posts_lost, "alignment": self.alignment, "anisotropy": self.anisotropy,
+            "held": self.held.tolist(),
             "distance": self.distance, "disagreement": self.disagreement, "unlike": self.out_of_distribution,
         }  # fmt: skip
 

@@ -1,0 +1,71 @@
+"""Whether tissue is held by the tethers that it was cast around."""
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from raptor.fields.shape import outside
+from raptor.moulds.cast import CastMould
+from raptor.moulds.loops import centre_of, winding
+
+CONTACT = 1.5  # l0; tissue this near touches
+RIM_STEP = 0.1  # l0, at most, between points of a rim
+
+
+def held(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float64]:
+    """Share of layers in which the tissue still encircles each tether, (tethers,).
+
+    A layer does where the smallest closed path of sites around the tether as cast still goes around its
+    centre once, either way; layers without such a path are not counted. NaN where none has one, as of a
+    tether that touches the outline.
+
+    Parameters
+    ----------
+    positions : ndarray (cells, 2 or 3)
+        Of the contracted tissue, l0, in the order of `cast.sites`.
+    """
+    shares = np.full(len(cast.loops), np.nan)
+    for number, (tether, loops) in enumerate(zip(cast.mould.tethers, cast.loops, strict=True)):
+        around = [abs(winding(positions[loop, :2], centre_of(tether))) == 1 for loop in loops]
+        if around:
+            shares[number] = np.mean(around)
+    return shares
+
+
+def contact(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float64]:
+    """Share of each tether's rim that has a cell within 1.5 l0 in the plane, (tethers,).
+
+    Parameters
+    ----------
+    positions : ndarray (cells, 2 or 3)
+        l0.
+    """
+    cells = KDTree(positions[:, :2])
+    distances = [cells.query(_rim(tether.polygon))[0] for tether in cast.mould.tethers]
+    return np.array([np.mean(each <= CONTACT) for each in distances], dtype=np.float64)
+
+
+def posts_lost(shares: NDArray[np.float64]) -> int:
+    """How many tethers are held in fewer than half of the layers, of `held` (tethers,)."""
+    return int(np.count_nonzero(shares < 0.5))
+
+
+def seen_held(
+    density: NDArray[np.floating], cast: CastMould, threshold: float | None = None
+) -> NDArray[np.float64]:
+    """Whether tissue encloses each tether in an image of its density (y, x): 1 or 0, (tethers,).
+
+    What `held` is of cells, as far as an image shows it. NaN where it encloses none as cast.
+    """
+    free = outside(density, cast.threshold if threshold is None else threshold)
+    free_as_cast = outside(cast.density, cast.threshold)
+    inside = [depth >= 0 for depth in cast.tether_depths]
+    return np.array([np.nan if free_as_cast[mask].any() else float(not free[mask].any()) for mask in inside])
+
+
+def _rim(polygon: shapely.Polygon) -> NDArray[np.float64]:
+    """Points (n, 2) evenly along a tether's rim, l0."""
+    rim = polygon.exterior
+    places = np.arange(0, rim.length, rim.length / np.ceil(rim.length / RIM_STEP))
+    return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(rim, places)))

@@ -60,7 +60,7 @@ def test_single_precision_computes_the_same(lattice, network, walls, random_stat
 
 def test_walls_are_exact_away_from_corners(small_mould, lattice, network, walls):
     # Cells pushed through straight walls, far from corners; and through the round post.
-    state = np.concatenate([np.zeros(3 * lattice.cells), np.tile([1.0, 0, 0], lattice.cells)])
+    state = np.concatenate([np.zeros(3 * lattice.cells), np.repeat([1.0, 0, 0], lattice.cells)])
     state = state.reshape(6, -1)
     state[:3] = np.array([[-5.5], [0.0], [0.4]])
     assert objective(state.ravel(), network, walls, 0.0)[1] == pytest.approx(

@@ -218,11 +218,16 @@ def test_scale_of_a_geojson_and_of_a_png(tmp_path):
         read_mould(tmp_path / "wide.png", -1.0)
 
 
-def test_a_drawing_without_cells(tmp_path):
+def test_a_size_that_cannot_work_is_refused_with_one_that_can(tmp_path):
     tiny = '<rect x="0.1" y="0.1" width="0.3" height="0.3"/>'
-    with pytest.raises(RaptorError, match=r"0.3 x 0.3 l0 .* scale of 3.34 or more \(--scale 173 fits\)"):
-        read_svg(tmp_path, tiny)
+    assert read_svg(tmp_path, tiny).outline.area == pytest.approx(52**2)
     assert read_svg(tmp_path, tiny, scale=100).outline.area == pytest.approx(900)
+    for scale, message in (
+        (0.3, r"0.09 x 0.09 l0 .* give a scale of 1.67 or more \(--scale 173 fits\)"),
+        (300, r"90 x 90 l0 .* give a scale of 208 or less \(--scale 173 fits\)"),
+    ):
+        with pytest.raises(RaptorError, match=message):
+            read_svg(tmp_path, tiny, scale=scale)
 
 
 @pytest.mark.parametrize(

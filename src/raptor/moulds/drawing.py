@@ -21,6 +21,7 @@ from raptor.frame import IMAGE_SIZE
 from raptor.moulds.geometry import SMALLEST_TETHER, Circle, Mould, PolygonTether, Tether, require_standing
 
 FITTED = 52.0  # l0; the longest side of a drawing that does not say its scale: the library's median
+SMALLEST = 0.5  # l0; the longest side of an outline below which no cell can lie inside
 ROW = 0.5  # l0; rows of sites of all layers, along x and along y
 LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this
 DIGITS = 4  # of a coordinate in l0, after the point: drawing programs and renderers round below that
@@ -161,7 +162,8 @@ class Drawing:
         for shape in sorted(closed, key=lambda shape: shape.role == ""):  # of twins, the one with a role
             if not any(_same(shape, other) for other in kept):
                 kept.append(shape)
-        return [shape for shape in closed if shape in kept]
+        chosen = {id(shape) for shape in kept}
+        return [shape for shape in closed if id(shape) in chosen]
 
     def _placement(self, outline: Shape, scale: float | None, mm_per_l0: float | None) -> "Placement":
         """Where the origin lies, and how long a drawing unit is."""
@@ -176,13 +178,15 @@ class Drawing:
         if scale is None:
             scale = self.l0
         if scale is None and self.framed and self.page is not None and self.page.covers(outline.polygon):
-            middle, scale = self.page.centre, IMAGE_SIZE / self.page.width
+            framed = IMAGE_SIZE / self.page.width
+            if longest * framed >= SMALLEST:
+                middle, scale = self.page.centre, framed
         fitted = scale is None
         scale = FITTED / longest if scale is None else scale
         if mm_per_l0 is None and self.mm is not None:
-            mm_per_l0 = self.mm / scale
+            mm_per_l0 = float(f"{self.mm / scale:.6g}")
         made = Placement(*middle, scale, mm_per_l0, fitted)
-        if not 1 <= longest * scale <= IMAGE_SIZE * (1 + 1e-6):
+        if not SMALLEST <= longest * scale <= IMAGE_SIZE * (1 + 1e-6):
             raise RaptorError(
                 f"the outline is {width * scale:.4g} x {height * scale:.4g} l0 at {scale:.4g} l0 per "
                 f"{self.unit}, and the frame is {IMAGE_SIZE} l0 wide; {self._advice(named, longest, scale)}"
@@ -191,12 +195,12 @@ class Drawing:
 
     def _advice(self, named: str, longest: float, scale: float) -> str:
         """The scale that fits an outline whose longest side is given in drawing units."""
-        small = longest * scale < 1
+        small = longest * scale < SMALLEST
         if named == "mm-per-l0" and self.mm is not None:
             fits = f"--mm-per-l0 {rounded(self.mm * longest / FITTED, up=True)}"
-            limit = rounded(self.mm * longest / (1 if small else IMAGE_SIZE), up=not small)
+            limit = rounded(self.mm * longest / (SMALLEST if small else IMAGE_SIZE), up=not small)
             return f"give --mm-per-l0 of {limit} or {'less' if small else 'more'} ({fits} fits)"
-        limit = rounded((1 if small else IMAGE_SIZE) / longest, up=small)
+        limit = rounded((SMALLEST if small else IMAGE_SIZE) / longest, up=small)
         side = "more" if small else "less"
         return f"give a scale of {limit} or {side} (--scale {rounded(FITTED / longest)} fits)"
 

@@ -19,6 +19,7 @@ from ezdxf.disassemble import recursive_decompose
 from ezdxf.document import Drawing as Document
 from ezdxf.entities.dxfgfx import DXFGraphic
 from ezdxf.entities.insert import Insert
+from ezdxf.entities.polygon import DXFPolygon
 from ezdxf.enums import InsertUnits
 from ezdxf.lldxf.const import DXFError
 from ezdxf.lldxf.tagger import binary_tags_loader
@@ -30,6 +31,7 @@ from raptor.moulds.drawing import Drawing, Line, Shape, role_of
 
 BINARY = b"AutoCAD Binary DXF"
 DRAWN = {"LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE", "SOLID", "TRACE", "3DFACE"}
+HATCHES = {"HATCH", "MPOLYGON"}  # all that some programs write
 FLAT = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
 MOST_SHAPES = 20_000
 
@@ -85,7 +87,11 @@ def _pieces(document: Document) -> Iterator[Shape | Line]:
         named = [outer.dxf.get("layer", ""), outer.dxf.get("name", "") if isinstance(outer, Insert) else ""]
         for entity in recursive_decompose([outer]):
             kind = entity.dxftype()
-            if not isinstance(entity, DXFGraphic) or kind not in DRAWN or not context.resolve_visible(entity):
+            if (
+                not isinstance(entity, DXFGraphic)
+                or kind not in DRAWN | HATCHES
+                or not context.resolve_visible(entity)
+            ):
                 continue
             layer = entity.dxf.get("layer", "0")
             name = f"{kind} {entity.dxf.get('handle') or 'in ' + named[1]} on layer '{layer}'"
@@ -94,7 +100,9 @@ def _pieces(document: Document) -> Iterator[Shape | Line]:
 
 def _traced(entity: DXFGraphic, name: str, role: str) -> Iterator[Shape | Line]:
     """An entity as closed and open lines."""
-    for path in paths.make_path(entity).sub_paths():
+    for path in (
+        paths.from_hatch(entity) if isinstance(entity, DXFPolygon) else paths.make_path(entity).sub_paths()
+    ):
         box = paths.bbox([path], fast=True)
         span = max(box.size.x, box.size.y) if box.has_data else 0.0
         if not span > 0:

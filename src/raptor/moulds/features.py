@@ -14,7 +14,7 @@ import shapely
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.drawing import Drawing, Line, Page, Shape, role_of
+from raptor.moulds.drawing import SMALLEST, Drawing, Line, Page, Shape, role_of
 from raptor.moulds.geojson import from_feature, polygon_of, read_features, tethers_of
 from raptor.moulds.geometry import Circle, Mould
 
@@ -47,6 +47,8 @@ def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None
         raise
     except (AttributeError, TypeError, KeyError, IndexError, ValueError, shapely.GEOSException) as error:
         raise RaptorError(f"{where} is not GeoJSON of a mould: {error}") from error
+    if not drawn:
+        raise RaptorError(f"{where} draws nothing that encloses an area; a Polygon is expected")
     shapes = tuple(shape for shape in drawn if isinstance(shape, Shape))
     _require_one_piece(shapes, where)
     lines = tuple(line for line in drawn if isinstance(line, Line))
@@ -61,7 +63,11 @@ def _is_in_frame(geometry: dict[str, Any]) -> bool:
     rings = geometry.get("coordinates") or []
     parts = [rings] if geometry["type"] == "Polygon" else rings
     corners = [float(value) for rings in parts for ring in rings for corner in ring for value in corner[:2]]
-    return not any(abs(value) > IMAGE_SIZE / 2 for value in corners)  # NaN is told of later
+    if not corners:
+        return True  # NaN and emptiness are told of later
+    places = np.reshape(corners, (-1, 2))
+    outside = np.abs(places).max() > IMAGE_SIZE / 2
+    return not (outside or 0 < np.ptp(places, axis=0).max() < SMALLEST)
 
 
 def _shapes(feature: dict[str, Any], where: str) -> Iterator[Shape | Line]:
@@ -119,5 +125,3 @@ def _require_one_piece(shapes: tuple[Shape, ...], where: str) -> None:
             f"{where} gives the depression in {1 + len(apart)} pieces ({bodies[0].name}, {apart[0].name}); a "
             "mould is one connected outline, so keep one"
         )
-    if not shapes:
-        raise RaptorError(f"{where} draws nothing that encloses an area; a Polygon is expected")

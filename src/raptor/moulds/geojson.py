@@ -13,6 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, read_text
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
+GEOMETRIES = ("Polygon", "MultiPolygon", "LineString", "MultiLineString", "GeometryCollection")
 PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area", "mm_per_l0")
 
 
@@ -54,7 +55,7 @@ def read_features(path: Path) -> list[dict[str, Any]]:
         features = document.get("features") or []
     elif kind == "Feature":
         features = [document]
-    elif kind in ("Polygon", "MultiPolygon", "GeometryCollection"):
+    elif kind in GEOMETRIES:
         features = [{"geometry": document, "properties": {}}]
     else:
         raise RaptorError(

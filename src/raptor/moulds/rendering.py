@@ -133,7 +133,7 @@ def _prepared(root: Element, page: tuple[float, float]) -> Element:
             element.set(NAME, name or "")
             element.set("id", name := f"raptor-{number}")
         taken.add(name or "")
-    document.append(Element(f"{SVG}rect", {"id": FRAME, "style": UNPAINTED, "width": "1", "height": "1"}))
+    document.append(Element(f"{SVG}ellipse", {"id": FRAME, "style": UNPAINTED, "rx": "1", "ry": "1"}))
     return document
 
 

@@ -1,5 +1,6 @@
 """Pixels of a picture of any common format, as a viewer shows them: turned, in colours, page by page."""
 
+import logging
 import struct
 import warnings
 import zlib
@@ -117,6 +118,7 @@ def _tiff(content: bytes, where: str, page: int | None) -> Pixels:
     """A page of a TIFF file; time points, slices and channels count as pages."""
     import tifffile  # slow to load, and most pictures are no TIFF
 
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it says of damage is raised below
     with tifffile.TiffFile(BytesIO(content)) as file:
         planes = [
             (series, number)

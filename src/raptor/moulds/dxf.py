@@ -6,6 +6,7 @@ count. The name of a layer or block tells outline and tethers apart, as an SVG g
 """
 
 import logging
+import struct
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -29,6 +30,11 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
 from raptor.moulds.drawing import Drawing, Line, Shape, role_of
 
+# ezdxf tells of damage by exceptions of many kinds.
+DAMAGE = (
+    DXFError, struct.error, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError,
+    AssertionError, ArithmeticError, RecursionError,
+)  # fmt: skip
 BINARY = b"AutoCAD Binary DXF"
 DRAWN = {"LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE", "SOLID", "TRACE", "3DFACE"}
 HATCHES = {"HATCH", "MPOLYGON"}  # all that some programs write
@@ -67,7 +73,16 @@ def _document(content: bytes, where: str) -> Document:
         if content.startswith(BINARY):
             return Document.load(binary_tags_loader(content))
         document, auditor = recover.read(BytesIO(content))
-    except (DXFError, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+    except (
+        DXFError,
+        struct.error,
+        OSError,
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+    ) as error:
         raise RaptorError(
             f"{where} is not DXF, or is truncated: its content {kind_of(content)} ({error}); save it "
             "again as DXF (AutoCAD 2000 or later)"

@@ -19,6 +19,9 @@ from raptor.moulds.geojson import from_feature, polygon_of, read_features, tethe
 from raptor.moulds.geometry import Circle, Mould
 
 FRAME = Page(-IMAGE_SIZE / 2, -IMAGE_SIZE / 2, IMAGE_SIZE, IMAGE_SIZE)
+DAMAGE = (
+    AttributeError, TypeError, KeyError, IndexError, ValueError, OverflowError, shapely.GEOSException,
+)  # fmt: skip
 NAMES = ("role", "kind", "type", "mould", "name", "layer", "Layer", "id")
 """Properties that may call a feature outline or tether."""
 
@@ -45,7 +48,7 @@ def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None
         raise RaptorError(f"{where} is nested too deeply; a mould is a Polygon or a few") from None
     except RaptorError:
         raise
-    except (AttributeError, TypeError, KeyError, IndexError, ValueError, shapely.GEOSException) as error:
+    except DAMAGE as error:
         raise RaptorError(f"{where} is not GeoJSON of a mould: {error}") from error
     if not drawn:
         raise RaptorError(f"{where} draws nothing that encloses an area; a Polygon is expected")

@@ -29,7 +29,7 @@ def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
     features = read_features(path)
     try:
         return [from_feature(f, path) for f in features if only is None or _name(f, path) in only]
-    except (AttributeError, TypeError, KeyError, IndexError) as error:
+    except (AttributeError, TypeError, KeyError, IndexError, OverflowError) as error:
         raise RaptorError(f"mould file {path} is not GeoJSON of a mould: {error}") from error
 
 
@@ -155,7 +155,7 @@ def _tether(entry: Any, what: str) -> Tether:
             if not all(map(isfinite, values)):
                 raise ValueError("all must be finite")
             return Circle(*values)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise RaptorError(f"{what}: x, y and radius must be numbers ({error})") from error
     raise RaptorError(f'{what} must be {{"x", "y", "radius"}} or {{"polygon": [[x, y], ...]}}')
 
@@ -175,5 +175,5 @@ def polygon_of(ring: Any, what: str) -> shapely.Polygon:
         if not all(isfinite(value) for corner in corners for value in corner):
             raise ValueError("every coordinate must be a finite number")
         return shapely.Polygon(corners)
-    except (TypeError, ValueError, IndexError, KeyError) as error:
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
         raise RaptorError(f"{what} is not a list of [x, y] corners: {error}") from error

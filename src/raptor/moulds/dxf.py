@@ -73,16 +73,7 @@ def _document(content: bytes, where: str) -> Document:
         if content.startswith(BINARY):
             return Document.load(binary_tags_loader(content))
         document, auditor = recover.read(BytesIO(content))
-    except (
-        DXFError,
-        struct.error,
-        OSError,
-        ValueError,
-        KeyError,
-        IndexError,
-        TypeError,
-        AttributeError,
-    ) as error:
+    except DAMAGE as error:
         raise RaptorError(
             f"{where} is not DXF, or is truncated: its content {kind_of(content)} ({error}); save it "
             "again as DXF (AutoCAD 2000 or later)"

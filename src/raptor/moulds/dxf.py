@@ -71,7 +71,8 @@ def _document(content: bytes, where: str) -> Document:
     logging.getLogger("ezdxf").setLevel(logging.ERROR)
     try:
         if content.startswith(BINARY):
-            return Document.load(binary_tags_loader(content))
+            # As text, since ezdxf repairs text alone.
+            content = "".join(tag.dxfstr() for tag in binary_tags_loader(content)).encode(errors="replace")
         document, auditor = recover.read(BytesIO(content))
     except DAMAGE as error:
         raise RaptorError(

@@ -26,13 +26,7 @@ EXPECTED = yaml.safe_load((DOORS / "expected.yaml").read_text(encoding="utf-8"))
 DOG_BONE = read_mould(DATA / "moulds" / "dog_bone.geojson")
 
 
-# A wall a rounding away from a row of sites decides about the row until sites keep l0/4 from walls.
-ROUNDED = {"svg/cairo_fixed_point.svg", "geojson/rounded6.geojson", "dxf/loose_lines_in.dxf"}
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.xfail(strict=False)) if n in ROUNDED else n for n in EXPECTED]
-)
+@pytest.mark.parametrize("name", EXPECTED)
 def test_every_drawing_holds_what_it_shows(name):
     expected = EXPECTED[name]
     if "says" in expected:
@@ -49,7 +43,7 @@ def test_every_drawing_holds_what_it_shows(name):
         return
     assert np.array_equal(cast_sites(mould, 7), cast_sites(DOG_BONE, 7))
     assert len(mould.tethers) == 4
-    assert all(isinstance(tether, Circle) for tether in mould.tethers)
+    assert all(isinstance(tether, Circle) for tether in mould.tethers) == expected.get("round", True)
 
 
 def test_a_table_with_a_mark_is_read_and_another_encoding_is_named():

@@ -9,6 +9,7 @@ import logging
 import struct
 from collections.abc import Iterator
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -53,17 +54,17 @@ def read_dxf(path: Path) -> Drawing:
     path = Path(path)
     where = f"mould file {path}"
     document = _document(read_input(path, "mould file", "a DXF drawing"), where)
-    shapes: list[Shape] = []
-    lines: list[Line] = []
-    for number, piece in enumerate(_pieces(document)):
-        if number >= MOST_SHAPES:
-            raise RaptorError(
-                f"{where} draws more than {MOST_SHAPES} lines; keep the outline and the tethers"
-            )
-        (shapes if isinstance(piece, Shape) else lines).append(piece)  # type: ignore[arg-type]
+    try:
+        drawn = list(islice(_pieces(document), MOST_SHAPES))
+    except DAMAGE as error:
+        raise RaptorError(f"{where} is damaged: {error}; save it again as DXF") from error
+    if len(drawn) == MOST_SHAPES:
+        raise RaptorError(f"{where} draws {MOST_SHAPES} lines or more; keep outline and tethers only")
+    shapes = tuple(shape for shape in drawn if isinstance(shape, Shape))
+    lines = tuple(line for line in drawn if isinstance(line, Line))
     unit = document.units
     mm = float(conversion_factor(InsertUnits(unit), InsertUnits.Millimeters)) if unit else None
-    return Drawing(tuple(shapes), tuple(lines), unit="drawing unit", mm=mm)
+    return Drawing(shapes, lines, unit="drawing unit", mm=mm)
 
 
 def _document(content: bytes, where: str) -> Document:

@@ -30,7 +30,7 @@ LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 NAME = "data-raptor-name"  # the id that an element had
 FRAME = "raptor-frame"  # id of a shape of ours, whose matrix is the drawing's own
 CANVAS = 65536  # pixels along the longer side: bounding boxes have single precision and three decimals
-RASTER = 256  # pixels along the longer side of a shape that is looked at
+RASTER = 128  # pixels along the longer side of a shape that is looked at
 FAINTEST = 3  # of 255: the least opacity that is seen
 HIDDEN = "visibility:hidden!important"
 UNPAINTED = "display:inline!important;transform:none!important;fill:none;stroke:none"
@@ -58,7 +58,7 @@ class Drawn:
     box : array (4,)
         x, y, width and height of its bounding box, user units.
     filled : bool
-        Whether it is seen without its stroke.
+        Whether it is closed by its kind, or seen without its stroke.
     left : float
         The share of it that clips and masks leave.
     """
@@ -186,12 +186,15 @@ def _as_points(document: Element, point: tuple[float, float]) -> Element:
     return document
 
 
-def _text(document: Element, size: tuple[float, float], view: tuple[float, float, float, float]) -> str:
-    """A picture of `size` pixels that shows the part `view` (x, y, width, height) of a document."""
-    outer = Element(f"{SVG}svg", {"width": f"{size[0]:.9g}", "height": f"{size[1]:.9g}"})
-    outer.set("viewBox", " ".join(f"{value:.9g}" for value in view))
-    outer.append(document)
-    return ElementTree.tostring(outer, encoding="unicode")
+def _text(inner: str, size: tuple[float, float], view: tuple[float, float, float, float]) -> str:
+    """A picture of `size` pixels that shows the part `view` (x, y, width, height) of a document as text."""
+    box = " ".join(f"{value:.9g}" for value in view)
+    sides = f'width="{size[0]:.9g}" height="{size[1]:.9g}"'
+    return f'<svg xmlns="{SVG[1:-1]}" {sides} viewBox="{box}">{inner}</svg>'
+
+
+def _as_text(document: Element) -> str:
+    return ElementTree.tostring(document, encoding="unicode")
 
 
 def _boxes(text: str) -> dict[str, NDArray[np.float64]]:
@@ -214,7 +217,7 @@ def _places(
     points = ((0.0, 0.0), (far, 0.0), (0.0, far))
     questions = [document, *(_as_points(document, point) for point in points)]
     with ThreadPoolExecutor() as pool:
-        answers = list(pool.map(_boxes, [_text(question, size, view) for question in questions]))
+        answers = list(pool.map(_boxes, [_text(_as_text(question), size, view) for question in questions]))
     boxes, *corners = [{name: box / zoom for name, box in answer.items()} for answer in answers]
     middles = [{name: box[:2] + box[2:] / 2 for name, box in each.items()} for each in corners]
     matrices = {}
@@ -240,13 +243,13 @@ def _looks(
             # Of a property that it does not know, the renderer takes no notice.
             own = element.get("style", "").strip(" ;\n\t")
             element.set("style", f"{own};{HIDDEN};raptor:{number};".strip(";") + ";")
-    looks: list[tuple[bool, float] | None] = []
+    whole_text, looks = _as_text(document), list[tuple[bool, float] | None]()
     for number, shape in enumerate(shapes):
         x, y, width, height = boxes[shape.get("id", "")]
         margin = 0.05 * max(width, height, 1e-6 * max(page))
         view = (x - margin, y - margin, width + 2 * margin, height + 2 * margin)
         zoom = RASTER / max(view[2:])
-        text = _text(document, (max(zoom * view[2], 1.0), max(zoom * view[3], 1.0)), view)
+        text = _text(whole_text, (max(zoom * view[2], 1.0), max(zoom * view[3], 1.0)), view)
 
         def opacity(style: str, sheet: str = "", text: str = text, number: int = number) -> Any:
             shown = text.replace(f"{HIDDEN};raptor:{number};", style)
@@ -259,7 +262,9 @@ def _looks(
         if "clip-path" in text or "mask" in text:
             whole = opacity(SOLID, CLEAR + UNCUT).sum()
             left = float(opacity(SOLID, CLEAR).sum() / whole) if whole > 0 else 1.0
-        looks.append((bool(opacity("stroke:none!important").max() >= FAINTEST), left))
+        may_be_open = tag_of(shape) in ("path", "polyline", "line")
+        filled = not may_be_open or bool(opacity("stroke:none!important").max() >= FAINTEST)
+        looks.append((filled, left))
     return looks
 
 

@@ -25,7 +25,9 @@ def test_directions_are_those_of_the_textbook():
         stored = step.astype(np.float32).astype(float), change.astype(np.float32).astype(float)
         pairs = pairs[-(MEMORY - 1) :]
         pairs += [] if number in refused else [stored]
-        slope = _direction_kernel(work)
+        slope, move, turn = _direction_kernel(work)
         wanted = naive.lbfgs_direction(pairs, work.gradient)
         assert work.direction == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
+        assert move == np.abs(work.direction[:30]).max()
+        assert turn == np.abs(work.direction[30:]).max()
         assert slope == pytest.approx(wanted @ work.gradient, rel=1e-6)

@@ -15,12 +15,23 @@ from numpy.typing import NDArray
 
 from raptor.condor.energy import SMALLEST_LEVER, Scratch, _objective_kernel, scratch, unit_orientations
 from raptor.condor.network import Network
-from raptor.condor.simd import DOUBLES, doubles, larger, largest, load_double, magnitude, muladd, total
+from raptor.condor.simd import (
+    DOUBLES,
+    dot,
+    doubles,
+    larger,
+    largest,
+    load_double,
+    magnitude,
+    muladd,
+    sqrt,
+    total,
+)
 from raptor.condor.walls import Walls
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 
-MEMORY = 8  # pairs of steps that the inverse Hessian is built from
+MEMORY = 5  # pairs of steps that the inverse Hessian is built from
 MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell
 MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
 SUFFICIENT = 1e-4  # Armijo's constant
@@ -94,23 +105,20 @@ def _largest(a):
 
 
 @kernel
-def _products_kernel(sp, yp, s, y, g):
-    """s_p.g, y_p.g, s_p.y, y_p.s and y_p.y of arrays of equal size."""
+def _products_kernel(sp, yp, s, g):
+    """s_p.g, y_p.g and y_p.s of arrays of equal size."""
     whole = g.size - g.size % DOUBLES
     zero = doubles(0.0)
-    sg, yg, sy, ys, yy = zero, zero, zero, zero, zero
+    sg, yg, ys = zero, zero, zero
     for i in range(0, whole, DOUBLES):
-        a, b = load_double(sp, i), load_double(yp, i)
-        c, d, e = load_double(s, i), load_double(y, i), load_double(g, i)
-        sg, yg = muladd(a, e, sg), muladd(b, e, yg)
-        sy, ys, yy = muladd(a, d, sy), muladd(b, c, ys), muladd(b, d, yy)
-    sums = total(sg), total(yg), total(sy), total(ys), total(yy)
+        y, gradient = load_double(yp, i), load_double(g, i)
+        sg = muladd(load_double(sp, i), gradient, sg)
+        yg = muladd(y, gradient, yg)
+        ys = muladd(y, load_double(s, i), ys)
+    sums = total(sg), total(yg), total(ys)
     for i in range(whole, g.size):
-        a, b = float(sp[i]), float(yp[i])
-        more = a * g[i], b * g[i], a * y[i], b * s[i], b * y[i]
-        sums = (
-            sums[0] + more[0], sums[1] + more[1], sums[2] + more[2], sums[3] + more[3], sums[4] + more[4]
-        )  # fmt: skip
+        y = float(yp[i])
+        sums = sums[0] + float(sp[i]) * g[i], sums[1] + y * g[i], sums[2] + y * s[i]
     return sums
 
 
@@ -118,33 +126,31 @@ def _products_kernel(sp, yp, s, y, g):
 def _residual_gradient_kernel(state, gradient, lever):
     """Largest component of the gradient, that by orientations as for vectors of the lever's length."""
     n = state.size // 6
-    residual = _largest(gradient[: 3 * n])
-    for i in range(3 * n, 4 * n):
-        a, b, c = state[i], state[i + n], state[i + 2 * n]
-        length = math.sqrt(a * a + b * b + c * c)
+    whole = n - n % DOUBLES
+    lanes = doubles(0.0)
+    for i in range(3 * n, 3 * n + whole, DOUBLES):
+        a, b, c = load_double(state, i), load_double(state, i + n), load_double(state, i + 2 * n)
+        turn = larger(magnitude(load_double(gradient, i)), magnitude(load_double(gradient, i + n)))
+        turn = larger(turn, magnitude(load_double(gradient, i + 2 * n)))
+        lanes = larger(lanes, turn * sqrt(dot(a, a, b, b, c, c)))
+    torque = largest(lanes)
+    for i in range(3 * n + whole, 4 * n):
+        a, b, c = float(state[i]), float(state[i + n]), float(state[i + 2 * n])
         turn = max(abs(gradient[i]), abs(gradient[i + n]), abs(gradient[i + 2 * n]))
-        residual = max(residual, turn * length / lever)
-    return residual
-
-
-@kernel
-def _longest_step(direction, lever):
-    """The longest multiple of a direction that keeps every move and turn within bounds."""
-    half = direction.size // 2
-    move = _largest(direction[:half])
-    turn = _largest(direction[half:]) / lever
-    return min(MAX_STEP / max(move, 1e-30), MAX_TURN / max(turn, 1e-30))
+        torque = max(torque, turn * math.sqrt(a * a + b * b + c * c))
+    return max(_largest(gradient[: 3 * n]), torque / lever)
 
 
 @kernel
 def _remember_kernel(state, work, slot, written):
-    """Go to the trial state, and store the step that led there as pair `slot` of those `written`."""
-    work.sg[:] = 0.0
-    work.yg[:] = 0.0
-    work.sy[slot, :] = 0.0
-    work.sy[:, slot] = 0.0
-    work.yy[slot, :] = 0.0
-    work.yy[:, slot] = 0.0
+    """Go to the trial state, and store the step that led there as pair `slot` of those `written`.
+
+    Products of a pair with the change of the gradient are changes of its products with the gradient.
+    """
+    for p in range(written):
+        work.sy[p, slot], work.yy[p, slot] = -work.sg[p], -work.yg[p]
+        work.sy[slot, p] = work.sg[p] = work.yg[p] = 0.0
+    curvature = square = 0.0
     for start in range(0, state.size, BLOCK):
         end = min(start + BLOCK, state.size)
         s, y = work.steps[slot, start:end], work.changes[slot, start:end]
@@ -155,16 +161,18 @@ def _remember_kernel(state, work, slot, written):
             y[i] = new_g[i] - g[i]
             x[i] = new_x[i]
             g[i] = new_g[i]
+        curvature += _dot(s, y)
+        square += _dot(y, y)
         for p in range(written):
-            sp, yp = work.steps[p, start:end], work.changes[p, start:end]
-            sg, yg, sy, ys, yy = _products_kernel(sp, yp, s, y, g)
+            sg, yg, ys = _products_kernel(work.steps[p, start:end], work.changes[p, start:end], s, g)
             work.sg[p] += sg
             work.yg[p] += yg
-            work.sy[p, slot] += sy
-            if p != slot:
-                work.sy[slot, p] += ys
-            work.yy[p, slot] += yy
-    work.yy[slot, :] = work.yy[:, slot]
+            work.sy[slot, p] += ys
+    for p in range(written):
+        work.sy[p, slot] += work.sg[p]
+        work.yy[p, slot] += work.yg[p]
+        work.yy[slot, p] = work.yy[p, slot]
+    work.sy[slot, slot], work.yy[slot, slot] = curvature, square
 
 
 @kernel
@@ -187,7 +195,10 @@ def _keep_kernel(state, work):
 
 @kernel
 def _direction_kernel(work):
-    """Two-loop recursion: direction = - (inverse Hessian) gradient; returns its slope."""
+    """Two-loop recursion: direction = - (inverse Hessian) gradient; returns its slope.
+
+    And its largest component by positions, and by orientations.
+    """
     memory = work.sg.size
     stored, newest = work.held[0], work.held[1]
     on_s, on_y = np.zeros(memory), np.zeros(memory)
@@ -209,20 +220,29 @@ def _direction_kernel(work):
         for q in range(memory):
             along += on_y[q] * work.yy[q, p] + on_s[q] * work.sy[q, p]
         on_s[p] = alpha[p] - along / work.sy[p, p]
-    slope = 0.0
-    for start in range(0, work.direction.size, BLOCK):
-        end = min(start + BLOCK, work.direction.size)
+    # In the precision of the state, so that nothing is converted number by number.
+    by_s, by_y = on_s.astype(work.direction.dtype), on_y.astype(work.direction.dtype)
+    by_g = np.full(1, scale).astype(work.direction.dtype)[0]
+    slope = move = turn = 0.0
+    half, start = work.direction.size // 2, 0
+    while start < 2 * half:
+        end = min(start + BLOCK, half if start < half else 2 * half)
         d, g = work.direction[start:end], work.gradient[start:end]
         for i in range(end - start):
-            d[i] = -scale * g[i]
+            d[i] = -by_g * g[i]
         for back in range(stored):
             p = (newest - back) % memory
             s, y = work.steps[p, start:end], work.changes[p, start:end]
-            a, b = on_s[p], on_y[p]
+            a, b = by_s[p], by_y[p]
             for i in range(end - start):
                 d[i] -= a * s[i] + b * y[i]
         slope += _dot(d, g)
-    return slope
+        if start < half:
+            move = max(move, _largest(d))
+        else:
+            turn = max(turn, _largest(d))
+        start = end
+    return slope, move, turn
 
 
 @kernel
@@ -270,13 +290,13 @@ def _minimise_kernel(
         small = _residual_gradient_kernel(state, work.gradient, lever) <= tolerance
         if (small and calm) if thorough else (small or calm):
             break
-        slope = _direction_kernel(work)
+        slope, move, turn = _direction_kernel(work)
         if slope >= 0.0:
             work.held[0] = 0
-            slope = _direction_kernel(work)
-        length = min(1.0, _longest_step(work.direction, lever))
-        if work.held[0] == 0:
-            length = min(length, 0.1 * _longest_step(work.direction, lever))
+            slope, move, turn = _direction_kernel(work)
+        # No move or turn goes beyond its bound, and the first of all not far.
+        longest = min(MAX_STEP / max(move, 1e-30), MAX_TURN * lever / max(turn, 1e-30))
+        length = min(1.0, longest if work.held[0] > 0 else 0.1 * longest)
         length, new_energy, new_wall_energy, trials = _search_kernel(
             state, energy + wall_energy, slope, length, network, walls, delta, contact, work
         )

@@ -55,6 +55,7 @@ class Contraction:
     ftol: float
     tolerance: float
     max_evaluations: int
+    step_evaluations: int = 30000
 
 
 def agitation_temperature(delta: float) -> float:
@@ -83,11 +84,11 @@ def contract(
     state: NDArray[Any], system: System, delta: float, contraction: Contraction, rng: Generator
 ) -> Minimum:
     """Contract a cast state (6 * cells,) to its Delta; evaluations are summed over all steps."""
-    used = 0
+    used, contact = 0, 0.0
     for target in steps_to(delta, contraction.shortening):
-        minimum = _step(state, system, target, contraction, rng, last=target == delta)
+        minimum = _step(state, system, target, contraction, rng, contact, last=target == delta)
         used += minimum.evaluations
-        state = minimum.state
+        state, contact = minimum.state, minimum.contact
     return minimum._replace(evaluations=used)
 
 
@@ -97,13 +98,17 @@ def _step(
     delta: float,
     contraction: Contraction,
     rng: Generator,
+    contact: float,
     last: bool,
 ) -> Minimum:
-    """One step to `delta`: agitated, minimised and, except in the draft, freed of inverted bonds."""
+    """One step to `delta`: agitated, minimised and, but for the one-step draft, freed of inverted bonds.
+
+    Once a step has needed contacts, all that follow have them from the outset.
+    """
     trial = state
     if contraction.sweeps:
         trial = agitate(state, system, delta, contraction.sweeps, rng)
-    minimum = _minimise(trial, system, delta, contraction, last)
+    minimum = _minimise(trial, system, delta, contraction, last, contact)
     if contraction.shortening < 1:
         minimum = _without_inversion(minimum, state, system, delta, contraction, last)
     return minimum
@@ -117,7 +122,7 @@ def _without_inversion(
     contraction: Contraction,
     last: bool,
 ) -> Minimum:
-    """A minimum without inverted bonds, with contacts from there or else from the start."""
+    """A minimum without inverted bonds: with contacts from there, or else from the start."""
     used = minimum.evaluations
     for state in (minimum.state, start):
         if inverted_fraction(minimum.state, system.lattice) == 0:
@@ -144,7 +149,7 @@ def _minimise(
         ftol=contraction.ftol,
         thorough=last and contraction.ftol >= 0,
         contact=contact,
-        max_evaluations=contraction.max_evaluations,
+        max_evaluations=contraction.max_evaluations if last else contraction.step_evaluations,
     )
 
 

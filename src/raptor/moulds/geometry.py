@@ -54,7 +54,7 @@ class Circle:
         reach: float = outline.exterior.distance(centre)
         return bool(outline.contains(centre) and reach >= self.radius - TOUCHING)
 
-    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth(self, points: NDArray[np.float64], marks: Any = None) -> NDArray[np.float64]:
         """Signed depth of points (n, 2) inside the post, (n,), l0; negative outside."""
         return self.radius - np.hypot(points[:, 0] - self.x, points[:, 1] - self.y)
 
@@ -97,9 +97,9 @@ class PolygonTether:
         """Whether it lies in the outline, touching allowed."""
         return bool(outline.covers(self.polygon.buffer(-TOUCHING)))
 
-    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth(self, points: NDArray[np.float64], marks: Any = None) -> NDArray[np.float64]:
         """Signed depth of points (n, 2) inside the tether, (n,), l0; negative outside."""
-        return signed_depth(self.polygon, points)
+        return signed_depth(self.polygon, points, marks)
 
     def transformed(self, matrix: NDArray[np.float64]) -> "PolygonTether":
         """The tether moved by a 2 x 2 orthogonal matrix."""
@@ -215,9 +215,10 @@ class Mould:
 
         Negative where a cell may be: minus the distance to the nearest wall.
         """
-        depth = -signed_depth(self.outline, points)
+        marks = shapely.points(points)  # made once; it costs more than the distances
+        depth = -signed_depth(self.outline, points, marks)
         for tether in self.tethers:
-            np.maximum(depth, tether.depth(points), out=depth)
+            np.maximum(depth, tether.depth(points, marks), out=depth)
         return depth
 
     def transformed(self, matrix: NDArray[np.float64]) -> "Mould":
@@ -269,13 +270,18 @@ def require_standing(tether: Tether, outline: shapely.Polygon, what: str) -> Non
         raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
 
 
-def signed_depth(polygon: shapely.Polygon, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of points (n, 2) to a polygon's boundary, (n,), positive inside, l0."""
+def signed_depth(
+    polygon: shapely.Polygon, points: NDArray[np.float64], marks: Any = None
+) -> NDArray[np.float64]:
+    """Distance of points (n, 2) to a polygon's boundary, (n,), positive inside, l0.
+
+    `marks` are the points as shapely's, where they have been made before.
+    """
     shapely.prepare(polygon)
     inside = shapely.contains_xy(polygon, points[:, 0], points[:, 1])
     boundary = polygon.exterior
     shapely.prepare(boundary)
-    distance = shapely.distance(shapely.points(points), boundary)
+    distance = shapely.distance(shapely.points(points) if marks is None else marks, boundary)
     return np.asarray(np.where(inside, distance, -distance), dtype=np.float64)
 
 

@@ -184,6 +184,9 @@ class BatchSolver:
         goal.contact[rows] = contact
         thorough = np.array(last) & (self.accuracy.contraction.ftol >= 0)
         goal.thorough = torch.where(mask, self._mask(thorough), goal.thorough)
+        rules = self.accuracy.contraction
+        most = np.where(last, rules.max_evaluations, rules.step_evaluations)
+        goal.max_evaluations = torch.where(mask, torch.tensor(most, device=self.device), goal.max_evaluations)
         shaken = chosen & (progress.phase == 0) & (goal.delta > 0).cpu().numpy()
         if self.accuracy.contraction.sweeps and shaken.any():
             self._agitate(shaken)

@@ -23,7 +23,7 @@ from raptor.dataset import run as running
 from raptor.dataset.check import check_shard
 from raptor.dataset.design import sample_design
 from raptor.dataset.shards import read_shard, write_shard
-from raptor.fields.shape import area_ratio
+from raptor.fields.shape import shape_ratios
 from raptor.moulds import Circle, Mould
 from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters, NetworkModel
@@ -219,7 +219,7 @@ def test_sixteen_tissues_agree_within_the_spread_of_seeds(contracted):
         others += [(s.energy - mean) / scale for s in theirs]
         cast = CastMould(task.mould, MODEL.layers, 128)
         ratios = [
-            area_ratio(rasterise(s.positions, s.orientation, s.tension, 128)[0], cast)
+            shape_ratios(rasterise(s.positions, s.orientation, s.tension, 128)[0], cast)[0]
             for s in (ours, *theirs)
         ]
         areas.append(ratios[0] - np.mean(ratios[1:]))

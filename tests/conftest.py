@@ -4,10 +4,38 @@ import numpy as np
 import pytest
 import shapely
 
+from raptor.condor import simulate
 from raptor.condor.lattice import build_lattice
 from raptor.moulds import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
 from tests.small import build
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--roundings", type=int, default=0, metavar="N",
+        help="run each test N times, with last bits of every state at casting changed at random: a "
+        "simulation then ends in another of its many states, as it does on another processor",
+    )  # fmt: skip
+
+
+def pytest_generate_tests(metafunc):
+    if count := metafunc.config.getoption("roundings"):
+        metafunc.parametrize("rounding", range(count), indirect=True)
+
+
+@pytest.fixture(autouse=True)
+def rounding(request, monkeypatch):
+    """States at casting that differ in their last bits, where `--roundings` asks for them."""
+    if not hasattr(request, "param"):
+        return
+    cast = simulate.cast_state
+
+    def rounded(sites, rng):
+        noise = np.random.default_rng(request.param).normal(size=6 * len(sites))
+        return cast(sites, rng) * (1 + 2e-16 * noise)
+
+    monkeypatch.setattr(simulate, "cast_state", rounded)
 
 
 @pytest.fixture(scope="session")

@@ -30,6 +30,8 @@ from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 from tests.small import CONFIG
 
+pytestmark = pytest.mark.one_processor
+
 SWEEPS = 100
 CPU = torch.device("cpu")
 MODEL = NetworkModel(2)

@@ -16,6 +16,8 @@ from raptor.condor.system import build_system
 from raptor.condor.walls import NO_WALLS
 from tests.small import ROOT
 
+pytestmark = pytest.mark.one_processor
+
 
 def test_baselines_have_the_energy_and_gradient_of_the_kernel(lattice, random_state):
     state = unit_orientations(random_state)

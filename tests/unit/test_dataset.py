@@ -27,6 +27,8 @@ from raptor.parameters import CellParameters
 from raptor.symmetry import FIELDS, Element, apply
 from tests.small import CONFIG, build
 
+pytestmark = pytest.mark.one_processor
+
 
 @pytest.fixture
 def folder(made, tmp_path):

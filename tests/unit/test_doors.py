@@ -20,6 +20,8 @@ from raptor.imaging import measure, read_picture, register
 from raptor.moulds import Circle, read_mould
 from raptor.moulds.cast import cast_sites
 
+pytestmark = pytest.mark.one_processor
+
 DATA = Path(__file__).parents[1] / "data"
 DOORS = DATA / "doors"
 EXPECTED = yaml.safe_load((DOORS / "expected.yaml").read_text(encoding="utf-8"))

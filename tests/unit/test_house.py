@@ -4,6 +4,10 @@ import ast
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.one_processor
+
 SOURCE = Path(__file__).parents[2] / "src"
 ROOMS = (
     "core", "frame", "symmetry", "parameters", "raster", "moulds", "fields", "condor", "dataset", "surrogate",

@@ -30,6 +30,8 @@ from raptor.moulds.cast import CastMould
 from raptor.plotting.overlay import overlay_figure
 from tests.photograph import CASES, Camera, contracted, coverage, photograph
 
+pytestmark = pytest.mark.one_processor
+
 MOULD = read_mould("four_post_rectangle")
 TISSUE = contracted(MOULD, 0.35, 0.08, 0.02, seed=1)
 CAMERA = Camera(angle=17)

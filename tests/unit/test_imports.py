@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.one_processor
+
 
 def test_figures_tables_and_configurations_do_not_wait_for_torch():
     rooms = "config, dataset, fields, fitting, imaging, moulds, plotting, studies"

@@ -16,6 +16,7 @@ from raptor.dataset.examples import read_examples
 from raptor.dataset.provenance import trace_example, trace_simulation
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples
+from raptor.fields.metrics import vrmse
 from raptor.moulds import moulds_by_id
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
@@ -30,20 +31,20 @@ def test_it_is_sound_and_small():
 
 
 def test_a_trace_is_enough_to_make_the_fields_again():
-    """From what the trace says alone: the solver's own tolerance is the only difference."""
+    """From what the trace says alone: as near as two seeds are, for another processor rounds otherwise."""
     traced = trace_simulation(MINI, 5)
-    made_by = traced["made by"]
+    made_by, (sample,) = traced["made by"], read_samples(MINI / "dataset" / "fields.nc", [5])
+    assert (traced["fields"]["sample"], sample.simulation) == (5, 5)
     mould = moulds_by_id(MINI / traced["mould"]["file"], {traced["mould"]["id"]})[traced["mould"]["id"]]
     model = NetworkModel(made_by["layers"], tuple(made_by["shells"]), made_by["tension"])
-    again = simulate(
-        mould, CellParameters(**traced["parameters"]), model, made_by["accuracy"], traced["seed"]
-    )
-    # Another processor may round otherwise and end in a neighbouring state.
-    assert again.energy == pytest.approx(traced["ended with"]["energy"], rel=0.03)
-    fields = rasterise(again.positions, again.orientation, again.tension, 64)
-    (sample,) = read_samples(MINI / "dataset" / "fields.nc", [traced["fields"]["sample"]])
-    assert sample.simulation == 5
-    assert np.corrcoef(fields[0].ravel(), sample.fields[0].ravel())[0, 1] > 0.98
+    parameters = CellParameters(**traced["parameters"])
+    errors = []
+    for seed in (traced["seed"], *range(4)):
+        tissue = simulate(mould, parameters, model, made_by["accuracy"], seed)
+        assert tissue.cells == sample.n_cells
+        fields = rasterise(tissue.positions, tissue.orientation, tissue.tension, 64)
+        errors.append(vrmse(fields[0], sample.fields[0]))
+    assert errors[0] < 2 * np.mean(errors[1:])
 
 
 def test_an_example_is_traced_to_its_image_and_simulation():

@@ -17,6 +17,8 @@ from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
 from raptor.moulds.summary import summarise, symmetry_class
 
+pytestmark = pytest.mark.one_processor
+
 ROOT = Path(__file__).parents[2]
 DOG_BONE = ROOT / "tests" / "data" / "moulds"
 FRAME = 'viewBox="-31.25 -31.25 62.5 62.5"'

@@ -11,8 +11,12 @@ from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import pytest
+
 from raptor.fitting import command, least_squares
 from tests.small import ROOT
+
+pytestmark = pytest.mark.one_processor
 
 PAGE = ROOT / "docs" / "python.md"
 BLOCK = re.compile(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)

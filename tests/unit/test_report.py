@@ -5,6 +5,8 @@ import pytest
 from raptor.core.errors import RaptorError
 from raptor.report.html import NOTHING, number, percent, section, write_report
 
+pytestmark = pytest.mark.one_processor
+
 
 @pytest.mark.parametrize(
     ("value", "digits", "text"),

@@ -151,7 +151,7 @@ def test_bad_input_to_simulate(arguments, message, tmp_path):
 
 def test_a_mould_without_cells(tmp_path):
     path = tmp_path / "tiny.geojson"
-    ring = [[0.1, 0.1], [0.3, 0.1], [0.3, 0.3]]
+    ring = [[0.1, 0.1], [9.4, 0.1], [9.4, 0.4], [0.1, 0.4]]  # between two rows of sites
     path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
     done = raptor("simulate", path, *options(), "--output", tmp_path / "x.nc")
     assert done.returncode != 0
@@ -189,7 +189,7 @@ def test_check_and_same(made, tmp_path):
     done = raptor("check", made)
     assert (done.returncode, done.stdout.strip()) == (0, f"{made}: no faults")
     empty = tmp_path / "empty.geojson"
-    write_moulds(empty, [Mould(shapely.box(0.1, 0.1, 0.4, 0.4))])
+    write_moulds(empty, [Mould(shapely.box(0.1, 0.1, 9.4, 0.4))])
     done = raptor("check", empty)
     assert done.returncode == 1
     assert "holds no cell" in done.stdout

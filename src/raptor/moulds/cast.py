@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.geometry import CLEARANCE, Mould
+from raptor.moulds.geometry import CLEARANCE, FITTED, Mould
 from raptor.moulds.loops import centre_of, smallest_loop
 from raptor.moulds.raster import MouldImage, mould_image, tether_depth
 from raptor.raster import density_image, density_threshold
@@ -150,9 +150,11 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
     ]
     sites = np.concatenate(parts)
     if len(sites) == 0:
+        x0, y0, x1, y1 = mould.outline.bounds
+        larger = FITTED / max(x1 - x0, y1 - y0)
         raise RaptorError(
-            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites stand "
-            "1 l0 apart, so draw it larger"
+            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites stand 1 l0 "
+            f"apart, so draw it larger, or give a scale up to {larger:.3g} times as large"
         )
     return sites
 

@@ -18,9 +18,16 @@ from scipy.spatial import KDTree
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.geometry import SMALLEST_TETHER, Circle, Mould, PolygonTether, Tether, require_standing
+from raptor.moulds.geometry import (
+    FITTED,
+    SMALLEST_TETHER,
+    Circle,
+    Mould,
+    PolygonTether,
+    Tether,
+    require_standing,
+)
 
-FITTED = 52.0  # l0; the longest side of a drawing that does not say its scale: the library's median
 SMALLEST = 0.5  # l0; the longest side of an outline below which no cell can lie inside
 ROW = 0.5  # l0; rows of sites of all layers, along x and along y
 LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this

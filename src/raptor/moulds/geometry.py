@@ -15,6 +15,7 @@ from shapely.validation import explain_validity
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
 
+FITTED = 52.0  # l0; the longest side of a drawing that does not say its scale: the library's median
 SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
 CLEARANCE = 0.248  # l0; a cell stands at least a quarter inside every wall, give or take a drawing's rounding
 STRICTLY = 1e-9  # l0; a pixel's centre this close to a wall lies on it

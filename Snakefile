@@ -13,27 +13,22 @@ report: "workflow/report/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/design.smk"
-include: "workflow/rules/simulate.smk"
-include: "workflow/rules/dataset.smk"
+include: "workflow/rules/campaign.smk"
 include: "workflow/rules/surrogate.smk"
-include: "workflow/rules/further.smk"
-include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/studies.smk"
 include: "workflow/rules/fit.smk"
-include: "workflow/rules/sweep.smk"
-include: "workflow/rules/tradeoff.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 
 
 localrules:
     all,
-    dataset,
+    campaigns,
     train,
     evaluate,
-    fit,
-    sweep,
+    studies,
     tradeoff,
+    fit,
     figures,
 
 

@@ -13,7 +13,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any
@@ -35,7 +35,7 @@ from raptor.condor.simulate import Tissue, simulate
 from raptor.config import Configuration, load
 from raptor.core.device import chosen_device
 from raptor.core.files import atomic_path
-from raptor.dataset.design import Run, sample_design
+from raptor.dataset.design import Run
 from raptor.dataset.scaling import Scaling
 from raptor.fields.metrics import vrmse
 from raptor.moulds.geometry import Mould
@@ -190,10 +190,10 @@ def prediction_seconds(architecture: Architecture, device: torch.device, batch: 
 
 
 def _prepared(configuration: Configuration, count: int) -> tuple[list[Run], list[Mould]]:
-    rules = configuration.design_rules()
-    edge = round(rules.edge * count / rules.simulations)
-    fewer = replace(rules, simulations=count, test=1, validation=1, edge=edge)
-    return sample_design(fewer, configuration.random_moulds(), configuration.seed)
+    design = configuration.design(next(iter(configuration.campaigns)))
+    edge = round(design.campaign.edge * count / design.campaign.runs)
+    fewer = {"runs": count, "test": 1, "validation": 1, "edge": edge}
+    return design.model_copy(update={"campaign": design.campaign.model_copy(update=fewer)}).make()
 
 
 def _rows(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -233,8 +233,8 @@ def main(
 ) -> None:
     """Check and time the whole way of a configuration on one device."""
     rules, where = load(configuration), chosen_device(device)
-    model, pixels = rules.network_model(), rules.fields.pixels
-    of = rules.design.simulations
+    model, pixels = rules.network_model, rules.pixels
+    of = rules.simulations(next(iter(rules.campaigns)))
     runs, moulds = _prepared(rules, simulations or of)
     # All that the processors do is done before a GPU is touched: processes are forked.
     started = time.perf_counter()

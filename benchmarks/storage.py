@@ -21,8 +21,7 @@ from rich.table import Table
 
 from benchmarks.training import examples_a_second, published
 from raptor.core.device import chosen_device
-from raptor.dataset.examples import read_examples
-from raptor.dataset.scaling import read_scaling
+from raptor.dataset.examples import read_examples, training_scaling
 from raptor.dataset.stack import read_samples, read_table
 from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.rules import TrainingRules
@@ -96,13 +95,13 @@ def reading_rate(dataset: ExampleSet, batch_size: int) -> float:
 
 
 def main(
-    folder: Annotated[Path, typer.Argument(help="results folder with a finished data set")],
+    folder: Annotated[Path, typer.Argument(help="folder of a finished campaign")],
     samples: Annotated[int, typer.Option(min=8, help="samples to store and to load")] = 128,
     channels: Annotated[int, typer.Option(min=1, help="base channels of the network that is trained")] = 64,
     batch_size: Annotated[int, typer.Option(min=2)] = 4,
 ) -> None:
     """Storage of a data set's fields, the rate of reading, and the appetite of training, in one run."""
-    stack = folder / "dataset" / "fields.nc"
+    stack = folder / "fields.nc"
     pixels = read_table(stack).pixels
     rows = range(min(samples, len(read_table(stack).split)))
     fields = np.stack([sample.fields for sample in read_samples(stack, rows)])
@@ -116,8 +115,8 @@ def main(
         table.add_row(s.name, f"{s.size / 1e3:.0f}", f"{s.write * 1e3:.1f}", f"{1 / s.read:.0f}", error)
     CONSOLE.print(table)
 
-    examples = list(islice(read_examples(folder / "dataset" / "examples.csv"), 4 * samples))
-    dataset = ExampleSet(stack, examples, read_scaling(folder / "dataset" / "normalisation.json"))
+    examples = list(islice(read_examples(folder / "examples.csv"), 4 * samples))
+    dataset = ExampleSet(stack, examples, training_scaling(stack))
     table = Table(title=f"One epoch of {len(examples)} examples, batches of {batch_size}")
     for head in ("what", "samples/s"):
         table.add_column(head, justify="right")

@@ -10,6 +10,21 @@ from raptor.moulds import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
 from tests.small import build
 
+FINISHED = ("test_dag.py", "test_end_to_end.py", "test_report.py")
+"""Files that look at the tiny run of the workflow."""
+
+
+def pytest_xdist_make_scheduler(config, log):
+    """One worker for each file, and one for all that look at the tiny run: what they share is made once."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByWhatIsShared(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            file = nodeid.split("::")[0]
+            return "finished" if file.endswith(FINISHED) else file
+
+    return ByWhatIsShared(config, log)
+
 
 def pytest_addoption(parser):
     parser.addoption(

@@ -35,9 +35,10 @@ class Trial:
             (folder / "config").symlink_to(ROOT / "config")
         self.command = [
             sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile"),
-            "--directory", str(folder), "--configfile", str(CONFIGURATION), "--cores", str(cores), "dataset",
+            "--directory", str(folder), "--configfile", str(CONFIGURATION), "--cores", str(cores),
+            "campaigns",
         ]  # fmt: skip
-        self.results = folder / "results" / "endurance"
+        self.results = folder / "results" / "endurance" / "campaigns" / "paper"
 
     def start(self) -> subprocess.Popen[str]:
         self.runs += 1
@@ -118,7 +119,7 @@ def truncate_shard(trial: Trial, moment: random.Random) -> str:
     trial.finish()
     shard = moment.choice(trial.shards())
     os.truncate(shard, shard.stat().st_size // 2)
-    (trial.results / "dataset" / "fields.nc").unlink()
+    (trial.results / "fields.nc").unlink()
     status = trial.finish()
     said = re.search(r"error: (.*)", trial.log())
     shard.unlink()

@@ -21,14 +21,13 @@ from raptor.condor.system import build_system, cast_state
 from raptor.core.errors import RaptorError
 from raptor.dataset import run as running
 from raptor.dataset.check import check_shard
-from raptor.dataset.design import sample_design
 from raptor.dataset.shards import read_shard, write_shard
 from raptor.fields.shape import shape_ratios
 from raptor.moulds import Circle, Mould
 from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
-from tests.small import CONFIG
+from tests.small import CONFIG, design
 
 pytestmark = pytest.mark.one_processor
 
@@ -291,11 +290,11 @@ def test_fields_are_those_of_the_kernel(contracted):
 
 def test_a_shard_made_in_a_batch_holds_every_run_that_can_be_cast(monkeypatch, tmp_path):
     """As a GPU makes it, here on the processor; what fails there is tried again one by one."""
-    runs, drawn = sample_design(CONFIG.design_rules(), CONFIG.random_moulds(), CONFIG.seed)
+    runs, drawn = design().make()
     moulds = {mould.name: mould for mould in drawn}
     moulds[runs[2].mould] = Mould(shapely.box(0.1, 0.1, 0.4, 0.4), name="between sites")
     told = []
-    model = CONFIG.network_model()
+    model = CONFIG.network_model
     made = running._simulate_together(
         runs, moulds, model, "draft", "cpu", lambda run, outcome: told.append(run.simulation)
     )

@@ -349,7 +349,7 @@ def test_the_shipped_model_predicts_without_training(tmp_path):
 
 
 def test_check_takes_moulds_and_tables(made, tmp_path):
-    for path in (MOULD, made / "design" / "design.csv", made / "dataset" / "normalisation.json"):
+    for path in (MOULD, made / "design.csv", made / "examples.csv"):
         assert check(Path(path)) == []
     for name in ("dog_bone.svg", "dog_bone.png"):
         assert check(DOG_BONE / name) == []

@@ -8,7 +8,8 @@ from pydantic import ValidationError
 from raptor.config import Configuration, load, require_measurable
 from raptor.config.reference import key_table, write_reference
 from raptor.core.errors import RaptorError
-from raptor.moulds.library.tissues import MeasuredTissue, load_tissues, require_measured
+from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
+from raptor.parameters import CellParameters
 
 
 @pytest.fixture
@@ -28,18 +29,28 @@ def test_the_default_configuration_states_every_default(root):
     assert load(root / "config" / "laptop.yaml") == Configuration()
 
 
-@pytest.mark.parametrize("name", ["laptop", "paper"])
+@pytest.mark.parametrize("name", ["laptop", "paper", "tradeoff"])
 def test_configurations_fit_schema_and_model(root, name):
     path = root / "config" / f"{name}.yaml"
     schema = json.loads((root / "workflow" / "schemas" / "config.schema.json").read_text())
     jsonschema.validate(yaml.safe_load(path.read_text()), schema)
-    assert load(path).name == name
+    configuration = load(path)
+    assert configuration.name == name
+    assert Configuration.model_validate(configuration.model_dump(mode="json")) == configuration
 
 
 def test_the_paper_is_configured_as_it_states(root):
     paper = load(root / "config" / "paper.yaml")
-    assert (paper.design.simulations, paper.design.test, paper.design.edge) == (3569, 445, 500)
-    assert (paper.model.layers, paper.fields.pixels) == (7, 256)
+    campaign = paper.campaigns["paper"]
+    assert (campaign.runs, campaign.test, campaign.edge) == (3569, 445, 500)
+    assert (paper.layers, paper.pixels, paper.surrogate) == (7, 256, "active")
+
+
+@pytest.mark.parametrize("name", ["laptop", "paper"])
+def test_the_hardest_corner_is_swept(root, name):
+    sweep = load(root / "config" / f"{name}.yaml").campaigns["sweep"]
+    assert CellParameters(0.9, 0.1, 0.01) in sweep.grid.points
+    assert list(sweep.files()) == ["four_post_rectangle", "i_shape"]
 
 
 def test_every_key_is_explained():
@@ -47,77 +58,125 @@ def test_every_key_is_explained():
 
 
 def test_shards_cover_every_simulation_once():
-    config = Configuration.model_validate({"simulation": {"shard_size": 5}})
-    numbers = [range(*(int(n) for n in shard.split("-"))) for shard in config.shards]
-    assert [n for r in numbers for n in (*r, r.stop)] == list(range(64))
+    config = Configuration.model_validate({"shard_size": 5})
+    for campaign in config.campaigns:
+        numbers = [range(*(int(n) for n in shard.split("-"))) for shard in config.shards(campaign)]
+        assert [n for r in numbers for n in (*r, r.stop)] == list(range(config.simulations(campaign)))
+
+
+STAGES = ("design", "simulation", "fields")
+
+
+def fingerprints(content=None):
+    """Of every campaign and stage, and of every model."""
+    config = Configuration.model_validate(content or {})
+    found = {(c, stage): config.fingerprint(stage, c) for c in config.campaigns for stage in STAGES}
+    return found | {name: config.model_fingerprint(name) for name in config.models}
+
+
+def changed(content):
+    """What another configuration than the default makes again."""
+    plain, other = fingerprints(), fingerprints(content)
+    return {key for key in plain if plain[key] != other.get(key)}
 
 
 def test_a_fingerprint_changes_with_what_it_depends_on_alone():
-    plain = Configuration()
-    cores = Configuration.model_validate({"simulation": {"shard_size": 9}, "fit": {"starts": 16}})
-    pixels = Configuration.model_validate({"fields": {"pixels": 64}})
-    for stage in ("design", "simulation", "dataset"):
-        assert plain.fingerprint(stage) == cores.fingerprint(stage)
-    for further in plain.further_sets:
-        assert plain.further_fingerprint(further) == cores.further_fingerprint(further)
-    more = Configuration.model_validate({"surrogate": {"ensemble_size": 5}})
-    longer = Configuration.model_validate({"surrogate": {"epochs": 5}})
-    for model in ("film_unet", "pix2pix"):
-        assert plain.model_fingerprint(model) == more.model_fingerprint(model)
-        assert plain.model_fingerprint(model) != longer.model_fingerprint(model)
-    assert plain.fingerprint("simulation") == pixels.fingerprint("simulation")
-    assert plain.fingerprint("dataset") != pixels.fingerprint("dataset")
+    plain, models = Configuration(), {"film_unet", "pix2pix"}
+    every = {(campaign, stage) for campaign in plain.campaigns for stage in STAGES}
+    assert len(set(fingerprints().values())) == len(every | models)
+    assert not changed({"shard_size": 9, "check_fraction": 0.5, "fit": {"simulations": 0}})
+    assert changed({"pixels": 64}) == {key for key in every if key[1] == "fields"} | models
+    assert changed({"accuracy": "draft"}) == {key for key in every if key[1] != "design"} | models
+    assert changed({"mould_scale": 0.6}) == {("sweep", stage) for stage in STAGES}
+    drawn = changed({"random_moulds": {"cells": [600, 3000]}})
+    assert drawn == {key for key in every if key[0] != "sweep"} | models
+    stated = plain.model_dump(mode="json")
+    stated["campaigns"]["mine"] = {"moulds": "glial_1", "runs": 3}
+    assert not changed(stated)
+    stated["campaigns"]["paper"]["runs"] = 65
+    assert changed(stated) == {key for key in every if key[0] in ("paper", "replicates")} | models
 
 
-def test_a_compared_model_is_the_surrogate_but_for_its_keys():
-    compared = {"other": {"network": "fno", "epochs": 3}}
-    config = Configuration.model_validate(
-        {"surrogate": {"ensemble_size": 4, "batch_size": 7}, "compared": compared}
-    )
-    assert list(config.models) == ["film_unet", "other"]
-    other = config.models["other"]
-    assert (other.network, other.epochs, other.batch_size, other.ensemble_size) == ("fno", 3, 7, 1)
-    for changes, message in (
-        ({"film_unet": {}}, "has the name of surrogate.model"),
-        ({"other": {"epoch": 3}}, "has the key 'epoch'"),
-        ({"other": {"epochs": 0}}, "greater than or equal to 1"),
-        ({"other": {"pixels": 100}}, "Input should be 16, 32, 64, 128"),
-    ):
-        with pytest.raises(ValidationError, match=message):
-            Configuration.model_validate({"compared": changes})
+def test_a_model_depends_on_its_keys_its_campaigns_and_where_it_starts():
+    given = {"film_unet": {"epochs": 5}, "on": {"initial_weights": "film_unet", "epochs": 2}, "other": {}}
+    plain = fingerprints({"models": given})
+
+    def differing(**change):
+        other = fingerprints({"models": given | change})
+        return {name for name in given if plain[name] != other[name]}
+
+    assert differing(film_unet={"epochs": 5, "ensemble_size": 3}) == set()
+    assert differing(film_unet={"epochs": 6}) == {"film_unet", "on", "other"}
+    assert differing(on={"initial_weights": "film_unet", "epochs": 3}) == {"on"}
 
 
-def test_a_model_continues_one_that_is_listed_before_it_and_like_it():
-    config = Configuration.model_validate(
-        {
-            "compared": {"on": {"initial_weights": "film_unet"}, "further": {"initial_weights": "on"}},
-            "chosen": "on",
-        }
-    )
-    assert (config.surrogate.model, config.chosen_model) == ("film_unet", "on")
-    longer = config.model_copy(update={"surrogate": config.surrogate.model_copy(update={"epochs": 9})})
-    changed = Configuration.model_validate(longer.model_dump())
-    assert all(config.model_fingerprint(n) != changed.model_fingerprint(n) for n in config.models)
-    for compared, message in (
-        ({"on": {"initial_weights": "off"}}, "no model listed before it; allowed are film_unet"),
-        (
-            {"on": {"initial_weights": "later"}, "later": {}},
-            "no model listed before it; allowed are film_unet",
-        ),
-        ({"on": {"initial_weights": "film_unet", "base_channels": 3}}, "on.base_channels differs from"),
-        ({"on": {"initial_weights": "film_unet", "ensemble_size": 3}}, "on.ensemble_size is 3; film_unet"),
-        ({"on": {"initial_weights": "film_unet", "adversarial": 1.0}}, "adversarial: 0"),
-    ):
-        with pytest.raises(ValidationError, match=message):
-            Configuration.model_validate({"compared": compared})
-    with pytest.raises(ValidationError, match="chosen is 'none'; allowed are film_unet, pix2pix"):
-        Configuration.model_validate({"chosen": "none"})
+def test_a_model_is_as_the_first_but_for_its_keys():
+    models = {"film_unet": {"ensemble_size": 4, "batch_size": 7}, "other": {"network": "fno", "epochs": 3}}
+    other = Configuration.model_validate({"models": models}).models["other"]
+    assert (other.network, other.epochs, other.batch_size, other.ensemble_size) == ("fno", 3, 7, 4)
+
+
+@pytest.mark.parametrize(
+    ("models", "message"),
+    [
+        ({"one": {"epoch": 3}}, "epoch"),
+        ({"one": {}, "two": {"epochs": 0}}, "greater than or equal to 1"),
+        ({"one": {}, "on": {"initial_weights": "off"}}, "initial_weights is 'off'; allowed are one, on"),
+        ({"one": {"initial_weights": "one"}}, "each of these waits for the next"),
+        ({"one": {}, "on": {"initial_weights": "one", "base_channels": 3}}, "on.base_channels differs"),
+        ({"one": {}, "on": {"initial_weights": "one", "ensemble_size": 3}}, "on.ensemble_size is 3"),
+        ({"one": {"campaigns": ["sweep"]}}, "sweep has no run to train on"),
+        ({"one": {"campaigns": ["papers"]}}, "campaigns has 'papers'; allowed are paper"),
+        ({"one": {"adversarial": 1.0}, "on": {"initial_weights": "one"}}, "set adversarial: 0"),
+    ],
+)
+def test_models_that_cannot_be_trained_are_named(models, message):
+    with pytest.raises(ValidationError, match=message):
+        Configuration.model_validate({"models": models})
+
+
+@pytest.mark.parametrize(
+    ("campaign", "message"),
+    [
+        ({"repeat_of": "none"}, "repeat_of is 'none'; allowed are paper"),
+        ({"repeat_of": "replicates"}, "repeat_of is 'replicates'; allowed are paper"),
+        ({"selected_by": "none", "test": 0}, "selected_by is 'none'; allowed are film_unet, pix2pix"),
+    ],
+)
+def test_campaigns_that_cannot_be_made_are_named(campaign, message):
+    campaigns = Configuration().model_dump(mode="json")["campaigns"] | {"mine": campaign}
+    with pytest.raises(ValidationError, match=message):
+        Configuration.model_validate({"campaigns": campaigns})
+
+
+def test_a_model_does_not_select_what_it_learns_from():
+    campaigns = {
+        "paper": {"test": 4, "validation": 4, "runs": 16},
+        "active": {"selected_by": "film_unet", "test": 0},
+    }
+    models = {"film_unet": {"campaigns": ["paper", "active"]}}
+    with pytest.raises(ValidationError, match="each of these waits for the next"):
+        Configuration.model_validate({"campaigns": campaigns, "models": models})
+    models = {"film_unet": {}, "active": {"campaigns": ["paper", "active"], "initial_weights": "film_unet"}}
+    config = Configuration.model_validate({"campaigns": campaigns, "models": models})
+    assert (config.surrogate, config.training_campaign) == ("film_unet", "paper")
+
+
+def test_without_models_campaigns_are_only_simulated():
+    config = Configuration.model_validate({"campaigns": {"mine": {"moulds": "i_shape"}}, "models": {}})
+    assert config.surrogate is None
+    assert config.training_campaign is None
+    assert not config.trial("soft")["surrogate"]
+    with pytest.raises(ValidationError, match="to simulate only"):
+        Configuration.model_validate({"campaigns": {"mine": {"moulds": "i_shape"}}})
+    with pytest.raises(ValidationError, match="selected_model is 'none'; allowed are film_unet, pix2pix"):
+        Configuration.model_validate({"selected_model": "none"})
 
 
 def test_all_tissues_can_be_fitted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tissues = load_tissues()
-    require_measurable(tissues, 1.0)
+    require_measurable({n: t for n, t in tissues.items() if t.measured}, 1.0)
     assert {"glial_1", "glial_2", "glial_3", "fibroblast", "corneal"} <= set(tissues)
 
 
@@ -125,10 +184,10 @@ def test_all_tissues_can_be_fitted(tmp_path, monkeypatch):
     ("text", "message"),
     [
         ("- a", "holds no keys"), ("a: [", "is not YAML"),
-        ("design: {tset: 3}", "unknown key 'design.tset'; did you mean 'test'"),
-        ("model: {shells: [2, 3, 4]}", "shells is"),
-        ("moulds: {symmetry: {none: 0}}", "positive weight"),
-        ("moulds: {cells: [9, 3]}", "ascending"),
+        ("fit: {tisues: [x]}", "unknown key 'fit.tisues'; did you mean 'tissues'"),
+        ("campaigns: {paper: {tset: 3}}", "unknown key 'campaigns.paper.tset'; did you mean 'test'"),
+        ("shells: [2, 3, 4]", "shells is"),
+        ("random_moulds: {cells: [9, 3]}", "ascending"),
         ("name: Bad Name", "name: String should match"),
         ("seed: .nan", "seed"),
     ],
@@ -147,14 +206,10 @@ def test_a_tissue_needs_a_measurement():
 
 
 def test_a_tissue_without_ratios_is_simulated_and_not_fitted():
-    tenocyte = load_tissues(names=("tenocyte",))
-    assert not tenocyte["tenocyte"].measured
-    require_measured({}, tenocyte)
-    with pytest.raises(RaptorError, match=r"name it in fit\.unmeasured"):
-        require_measured(tenocyte, {})
-    measured = MeasuredTissue.model_validate({"description": "x", "mould": "y", "area_ratio": 0.5})
-    with pytest.raises(RaptorError, match="has no paper"):
-        require_measured({}, {"x": measured})
+    with pytest.raises(
+        RaptorError, match=r"cannot be fitted; simulate it as a campaign, with moulds: .tenocyte"
+    ):
+        require_measurable(load_tissues(names=("tenocyte",)), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -187,8 +242,3 @@ def test_a_gpu_is_not_made_up(monkeypatch):
     assert chosen_device("auto", gpus=0) == "cpu"  # a job that was given none
     monkeypatch.setattr("shutil.which", lambda name: None)
     assert chosen_device("auto") == "cpu"
-
-
-def test_a_gpu_contracts_at_draft_and_standard_only():
-    with pytest.raises(ValidationError, match="accuracy: reference choose device: auto or cpu"):
-        Configuration.model_validate({"device": "cuda", "simulation": {"accuracy": "reference"}})

@@ -15,8 +15,8 @@ from raptor.dataset import shards
 from raptor.dataset.card import card
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
-from raptor.dataset.design import read_design, sample_design
-from raptor.dataset.examples import augment, read_examples, training_scaling
+from raptor.dataset.design import read_design
+from raptor.dataset.examples import list_examples, read_examples, training_scaling
 from raptor.dataset.progress import progress_of
 from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
@@ -25,7 +25,7 @@ from raptor.dataset.well import write_well
 from raptor.moulds import Mould, read_moulds
 from raptor.parameters import CellParameters
 from raptor.symmetry import FIELDS, Element, apply
-from tests.small import CONFIG, build
+from tests.small import build, design
 
 pytestmark = pytest.mark.one_processor
 
@@ -39,8 +39,8 @@ def folder(made, tmp_path):
 
 def test_the_data_set_keeps_its_rules(made):
     assert check(made) == []
-    assert check(made / "simulations" / "0.nc") == []
-    assert check(made / "dataset" / "fields.nc") == []
+    assert check(made / "shards" / "0.nc") == []
+    assert check(made / "fields.nc") == []
 
 
 def test_other_shards_give_the_same_data(made, tmp_path):
@@ -59,7 +59,7 @@ def test_a_swapped_sign_is_named(folder):
     def swap(fields):
         fields[2, 5] *= -1
 
-    edit(folder / "dataset" / "fields.nc", "fields", swap)
+    edit(folder / "fields.nc", "fields", swap)
     (fault,) = check(folder)
     assert "simulation 2" in fault
     assert "sxsy has the opposite sign" in fault
@@ -69,19 +69,19 @@ def test_a_swapped_sign_of_an_orientation_is_named(folder):
     def swap(sx):
         sx[:50] *= -1
 
-    edit(folder / "simulations" / "0.nc", "sx", swap)
+    edit(folder / "shards" / "0.nc", "sx", swap)
     assert any("energy is" in fault and "recomputed" in fault for fault in check(folder))
 
 
 def test_a_mould_in_two_splits_is_named(folder):
-    splits = read_table(folder / "dataset" / "fields.nc").split
+    splits = read_table(folder / "fields.nc").split
     one, two = splits.index("train"), splits.index("test")
 
     def copy(masks):
         masks[two] = np.rot90(masks[one])
 
     for name in ("depression", "tethers"):
-        edit(folder / "dataset" / "fields.nc", name, copy)
+        edit(folder / "fields.nc", name, copy)
     assert any("one mould in two splits" in fault for fault in check(folder))
 
 
@@ -89,7 +89,7 @@ def test_nan_is_named(folder):
     def spoil(fields):
         fields[1, 3, 5, 5] = np.nan
 
-    edit(folder / "dataset" / "fields.nc", "fields", spoil)
+    edit(folder / "fields.nc", "fields", spoil)
     assert any("simulation 1: NaN or infinity in sysy" in fault for fault in check(folder))
 
 
@@ -97,23 +97,23 @@ def test_nan_in_what_a_solver_reports_is_named(folder):
     def spoil(gradient):
         gradient[0] = np.nan
 
-    edit(folder / "simulations" / "0.nc", "gradient", spoil)
-    assert check(folder) == ["0.nc: NaN or infinity in gradient"]
+    edit(folder / "shards" / "0.nc", "gradient", spoil)
+    assert check(folder) == ["unit: 0.nc: NaN or infinity in gradient"]
 
 
 def test_negative_density_lost_cells_and_a_broken_trace_are_named(folder):
     def spoil(fields):
         fields[0, 0] -= 0.1
 
-    edit(folder / "dataset" / "fields.nc", "fields", spoil)
-    faults = " ".join(check(folder / "dataset" / "fields.nc"))
+    edit(folder / "fields.nc", "fields", spoil)
+    faults = " ".join(check(folder / "fields.nc"))
     for what in ("density is negative", "density sums to", "sxsx + sysy + szsz is not density"):
         assert what in faults
 
 
 def test_an_example_of_the_test_split_and_a_double_one_are_named(folder):
-    path = folder / "dataset" / "examples.csv"
-    held_out = read_table(folder / "dataset" / "fields.nc").split.index("test")
+    path = folder / "examples.csv"
+    held_out = read_table(folder / "fields.nc").split.index("test")
     lines = path.read_text().splitlines()
     path.write_text("\n".join([*lines, lines[1], f"{held_out},0"]) + "\n")
     faults = " ".join(check(folder))
@@ -122,7 +122,7 @@ def test_an_example_of_the_test_split_and_a_double_one_are_named(folder):
 
 
 def test_a_truncated_shard_is_named(folder):
-    path = folder / "simulations" / "0.nc"
+    path = folder / "shards" / "0.nc"
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     assert any("0.nc is truncated or damaged" in fault for fault in check(folder))
     with pytest.raises(RaptorError, match="is truncated"):
@@ -131,44 +131,47 @@ def test_a_truncated_shard_is_named(folder):
 
 def test_a_shard_of_another_configuration_is_named(made):
     with pytest.raises(RaptorError, match="another configuration"):
-        read_shard(made / "simulations" / "0.nc", "other")
+        read_shard(made / "shards" / "0.nc", "other")
 
 
 def test_a_missing_simulation_is_named(made, tmp_path):
-    runs = read_design(made / "design" / "design.csv")
+    runs = read_design(made / "design.csv")
     moulds = {r.mould: Mould(shapely.box(-9, -9, 9, 9)) for r in runs}
     with pytest.raises(RaptorError, match=r"simulations \[4, 5\] are in no shard"):
         build_stack(
-            tmp_path / "fields.nc", [made / "simulations" / "0.nc"], runs, moulds, 32,
+            tmp_path / "fields.nc", [made / "shards" / "0.nc"], runs, moulds, 32,
             simulation_configuration="c", configuration="d",
         )  # fmt: skip
     assert not list(tmp_path.iterdir())
 
 
 def test_the_design_keeps_its_counts_and_bounds(made):
-    runs = read_design(made / "design" / "design.csv")
+    runs = read_design(made / "design.csv")
     assert [sum(r.split == s for r in runs) for s in ("train", "validation", "test")] == [3, 1, 2]
-    assert sum(r.edge for r in runs) == 2
+    assert sum(r.own["edge"] == "True" for r in runs) == 2
     for run in runs:
         run.parameters.require_sampled("design")
-        assert run.edge == (run.parameters.delta in (0.05, 0.95))
+        assert run.own["edge"] == str(run.parameters.delta in (0.05, 0.95))
     assert len({r.seed for r in runs}) == len({r.mould for r in runs}) == 6
 
 
-def test_a_simulation_hangs_on_its_id_alone():
-    few, many = (CONFIG.design_rules().__class__(n, 1, 1, 0) for n in (4, 9))
-    a = sample_design(few, CONFIG.random_moulds(), 3)
-    b = sample_design(many, CONFIG.random_moulds(), 3)
-    assert a[1] == b[1][:4]
-    assert [(r.parameters, r.seed) for r in a[0]] == [(r.parameters, r.seed) for r in b[0][:4]]
+def test_a_run_depends_on_its_number_and_its_campaign_alone():
+    few, many, other = (
+        given.make()
+        for given in (design(runs=4, edge=0), design(runs=9, edge=0), design("other", runs=4, edge=0))
+    )
+    assert few[1] == many[1][:4]
+    assert [(r.parameters, r.seed) for r in few[0]] == [(r.parameters, r.seed) for r in many[0][:4]]
+    assert {r.seed for r in few[0]}.isdisjoint(r.seed for r in other[0])
+    assert few[1][0] != other[1][0]
 
 
 def test_a_spoilt_design_is_named(made, tmp_path):
-    text = (made / "design" / "design.csv").read_text()
+    text = (made / "design.csv").read_text()
     for old, new, message in (
         ("train", "trian", "line .*split is 'trian'"),
         ("simulation,", "simulations,", "columns"),
-        ("True", "maybe", "maybe"),
+        (",test,", ",test,x", "could not convert"),
     ):
         path = tmp_path / "design.csv"
         path.write_text(text.replace(old, new, 1))
@@ -177,16 +180,16 @@ def test_a_spoilt_design_is_named(made, tmp_path):
 
 
 def test_examples_are_the_distinct_images_of_train_and_validation(made):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     table = read_table(stack)
-    examples = augment(stack)
+    examples = list_examples(stack)
     assert {table.split[e.sample] for e in examples} == {"train", "validation"}
     assert all(sum(e.sample == row for e in examples) in (1, 2, 4, 8) for row in table.rows("train"))
     assert {e.sample for e in examples if e.element == 0} == set(table.rows("train", "validation"))
 
 
 def test_scaling_is_of_the_training_split_and_commutes_with_d4(made):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     scaling = training_scaling(stack)
     train = [s.fields for s in read_samples(stack, read_table(stack).rows("train"))]
     scaled = np.stack([scaling.forward(fields) for fields in train])
@@ -216,27 +219,27 @@ def test_a_failed_simulation_is_recorded_and_the_rest_survives(made, tmp_path, m
     really, tries = running.simulate, []
 
     def sometimes(mould, parameters, model, accuracy, seed):
-        number = next(run.simulation for run in design if run.seed == seed)
+        number = next(run.simulation for run in runs if run.seed == seed)
         tries.append(number)
         if number == 1 or tries == [0, 1, 1, 2]:
             raise FloatingPointError("no room")
         made_one = really(mould, parameters, model, accuracy, seed)
         return replace(made_one, energy=np.nan) if number == 4 else made_one
 
-    design = read_design(made / "design" / "design.csv")
+    runs = read_design(made / "design.csv")
     monkeypatch.setattr(running, "simulate", sometimes)
     build(folder, 3)
     assert tries == [0, 1, 1, 2, 2, 3, 4, 4, 5]
-    found = shards.read_shard(folder / "simulations" / "0.nc")
+    found = shards.read_shard(folder / "shards" / "0.nc")
     assert [record.simulation for record in found.records] == [0, 2]
     assert found.failures == {1: "FloatingPointError: no room"}
-    stack = folder / "dataset" / "fields.nc"
+    stack = folder / "fields.nc"
     assert read_table(stack).simulation.tolist() == [0, 2, 3, 5]
     assert check(folder) == []
-    parts = [shards.read_shard(folder / "simulations" / f"{n}.nc") for n in (0, 3)]
-    moulds = read_moulds(folder / "design" / "moulds.geojson")
-    examples = read_examples(folder / "dataset" / "examples.csv")
-    text = card("unit", design, moulds, parts, stack, examples)
+    parts = [shards.read_shard(folder / "shards" / f"{n}.nc") for n in (0, 3)]
+    moulds = read_moulds(folder / "moulds.geojson")
+    examples = read_examples(folder / "examples.csv")
+    text = card("unit", runs, moulds, parts, stack, examples)
     assert "missing: 1 (FloatingPointError: no room); 4 (the solver met numbers that are not finite)" in text
 
 
@@ -251,11 +254,11 @@ def test_a_split_without_simulations_stops_the_data_set(tmp_path, monkeypatch):
 
 def test_shards_of_two_devices_are_not_put_together(made, tmp_path):
     shutil.copytree(made, tmp_path / "unit")
-    shards_made = sorted((tmp_path / "unit" / "simulations").glob("*.nc"))
+    shards_made = sorted((tmp_path / "unit" / "shards").glob("*.nc"))
     with netCDF4.Dataset(shards_made[-1], "a") as file:
         file.device = "cuda"
-    runs = read_design(made / "design" / "design.csv")
-    moulds = {mould.name: mould for mould in read_moulds(made / "design" / "moulds.geojson")}
+    runs = read_design(made / "design.csv")
+    moulds = {mould.name: mould for mould in read_moulds(made / "moulds.geojson")}
     with pytest.raises(RaptorError, match="made on another device than those before it"):
         build_stack(
             tmp_path / "stack.nc",
@@ -269,7 +272,7 @@ def test_shards_of_two_devices_are_not_put_together(made, tmp_path):
 
 
 def test_the_wells_layout_holds_the_same_fields(made, tmp_path):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     table = read_table(stack)
     paths = write_well(stack, tmp_path)
     assert [path.relative_to(tmp_path).parts[1] for path in paths] == ["train", "valid", "test"]
@@ -301,7 +304,7 @@ def test_a_part_of_the_simulations_is_computed_again(folder):
     def spoil(energy):
         energy += 1
 
-    for shard in (folder / "simulations").glob("*.nc"):
+    for shard in (folder / "shards").glob("*.nc"):
         edit(shard, "energy", spoil)
     everything, half = check(folder), check(folder, 0.5)
     assert len(everything) == 6
@@ -312,7 +315,7 @@ def test_a_part_of_the_simulations_is_computed_again(folder):
 def test_progress_counts_what_is_done(folder):
     assert progress_of(folder).done == 6
     assert progress_of(folder).seconds_left == 0
-    (folder / "simulations" / "4.nc").unlink()
+    (folder / "shards" / "4.nc").unlink()
     half = progress_of(folder)
     assert (half.designed, half.done, half.failed) == (6, 4, 0)
     assert 0 < half.seconds_left < float("inf")

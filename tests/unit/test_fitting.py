@@ -222,7 +222,7 @@ def test_a_joint_fit_serves_all_tissues_alike():
 def test_a_posterior_shows_the_valley():
     """Two numbers leave a curve of the region: its ends fit as well as the truth."""
     target = Target(*smooth([TRUTH])[0])
-    posterior = infer(surveyed(), target, 0.01, seed=0, dense=2**13)
+    posterior = infer(surveyed(), target, seed=0, dense=2**13)
     assert posterior.weights.sum() == pytest.approx(1)
     summary = summarise(posterior)
     assert summary["reachable"]
@@ -235,7 +235,7 @@ def test_a_posterior_shows_the_valley():
     assert left == sorted(left)
     assert left[0] < 0.15 < 0.5 < left[2]
     assert nnn["profile_interval"]["lower"] < TRUTH.kappa_nnn < nnn["profile_interval"]["upper"]
-    alone = summarise(infer(surveyed(), Target(None, target.width_ratio), 0.01, seed=0, dense=2**13))
+    alone = summarise(infer(surveyed(), Target(None, target.width_ratio), seed=0, dense=2**13))
     assert alone["part_of_region"] > summary["part_of_region"]
     assert alone["determined"] <= summary["determined"]
     values, heights = profile(posterior, "delta")
@@ -246,7 +246,7 @@ def test_a_posterior_shows_the_valley():
 def test_the_surrogates_error_widens_intervals():
     target = Target(*smooth([TRUTH])[0])
     widths = [
-        summarise(infer(surveyed(sigma=sigma), target, 0.01, 0, 2**13))["parameters"]["delta"]["std"]
+        summarise(infer(surveyed(sigma=sigma), target, 0, 0.01, 2**13))["parameters"]["delta"]["std"]
         for sigma in (0.0, 0.05)
     ]
     assert widths[1] > 1.5 * widths[0]
@@ -259,19 +259,19 @@ def test_a_posterior_is_that_of_plain_quadrature():
     squares = (target.residuals(smooth(parameters)) ** 2).sum(axis=1) / error**2
     weights = prior_density(units) * np.exp(-0.5 * squares)
     mean = weights / weights.sum() @ as_array(parameters)
-    posterior = infer(surveyed(sigma=0.0), target, error, 0, 2**14)
+    posterior = infer(surveyed(sigma=0.0), target, 0, error, 2**14)
     assert posterior.weights @ posterior.parameters == pytest.approx(mean, abs=0.01)
     assert (interpolation_error(surveyed())[:2] < 3e-3).all()
 
 
 def test_what_the_model_cannot_make_is_said():
-    summary = summarise(infer(surveyed(), Target(0.95, 0.3), 0.01, seed=0, dense=2**12))
+    summary = summarise(infer(surveyed(), Target(0.95, 0.3), seed=0, dense=2**12))
     assert not summary["reachable"]
     nothing = surveyed()
     nothing.values[:, 1] = np.nan
     with pytest.raises(RaptorError, match="cannot be measured everywhere"):
-        infer(nothing, Target(None, 0.5), 0.01, 0, 2**12)
-    assert summarise(infer(nothing, Target(0.7, None), 0.01, 0, 2**12))["reachable"]
+        infer(nothing, Target(None, 0.5), 0, 0.01, 2**12)
+    assert summarise(infer(nothing, Target(0.7, None), 0, 0.01, 2**12))["reachable"]
 
 
 def test_what_a_measurement_leaves_is_that_of_normal_theory():
@@ -283,7 +283,7 @@ def test_what_a_measurement_leaves_is_that_of_normal_theory():
 
 
 def test_further_measurements_are_ranked_by_what_they_leave():
-    posterior = infer(surveyed(), Target(*smooth([TRUTH])[0]), 0.01, seed=0, dense=2**13)
+    posterior = infer(surveyed(), Target(*smooth([TRUTH])[0]), seed=0, dense=2**13)
     nothing = Sampled(np.empty((0, 3)), pd.DataFrame(columns=[*SEEN, "thickness"]))
     table = rank_measurements(posterior, nothing, Target(*smooth([TRUTH])[0]), 0)
     assert table["measurement"].tolist()[0] == "outline"  # shows all three parameters here
@@ -293,7 +293,7 @@ def test_further_measurements_are_ranked_by_what_they_leave():
 
 
 def test_simulated_draws_tell_thickness_and_errors():
-    posterior = infer(surveyed(), Target(*smooth([TRUTH])[0]), 0.01, seed=0, dense=2**12)
+    posterior = infer(surveyed(), Target(*smooth([TRUTH])[0]), seed=0, dense=2**12)
     simulator = Simulator(NetworkModel(2), "draft", 32, 5)
     sampled = simulate_draws(posterior, simulator, BOX, 5)
     assert sampled.table["thickness"].between(0.3, 1.2).all()

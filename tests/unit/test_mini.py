@@ -12,9 +12,8 @@ from raptor.condor.simulate import simulate
 from raptor.core.errors import RaptorError
 from raptor.dataset.check import check
 from raptor.dataset.design import read_design
-from raptor.dataset.examples import read_examples
+from raptor.dataset.examples import read_examples, training_scaling
 from raptor.dataset.provenance import trace_example, trace_simulation
-from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_samples
 from raptor.fields.metrics import vrmse
 from raptor.moulds import moulds_by_id
@@ -22,7 +21,7 @@ from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 from raptor.surrogate.batches import ExampleSet
 from raptor.symmetry import Element, apply
-from tests.small import MINI, ROOT
+from tests.small import CAMPAIGN, MINI, ROOT
 
 
 def test_it_is_sound_and_small():
@@ -32,10 +31,10 @@ def test_it_is_sound_and_small():
 
 def test_a_trace_is_enough_to_make_the_fields_again():
     """From what the trace says alone: as near as two seeds are, for another processor rounds otherwise."""
-    traced = trace_simulation(MINI, 5)
-    made_by, (sample,) = traced["made by"], read_samples(MINI / "dataset" / "fields.nc", [5])
+    traced = trace_simulation(CAMPAIGN, 5)
+    made_by, (sample,) = traced["made by"], read_samples(CAMPAIGN / "fields.nc", [5])
     assert (traced["fields"]["sample"], sample.simulation) == (5, 5)
-    mould = moulds_by_id(MINI / traced["mould"]["file"], {traced["mould"]["id"]})[traced["mould"]["id"]]
+    mould = moulds_by_id(CAMPAIGN / traced["mould"]["file"], {traced["mould"]["id"]})[traced["mould"]["id"]]
     model = NetworkModel(made_by["layers"], tuple(made_by["shells"]), made_by["tension"])
     parameters = CellParameters(**traced["parameters"])
     errors = []
@@ -48,40 +47,41 @@ def test_a_trace_is_enough_to_make_the_fields_again():
 
 
 def test_an_example_is_traced_to_its_image_and_simulation():
-    chosen = read_examples(MINI / "dataset" / "examples.csv")[7]
-    traced = trace_example(MINI, 7)
+    chosen = read_examples(CAMPAIGN / "examples.csv")[7]
+    traced = trace_example(CAMPAIGN, 7)
     assert traced["image under D4"]["element"] == chosen.element
     assert traced["fields"]["sample"] == chosen.sample
-    assert "test" not in {trace_example(MINI, n)["split"] for n in (0, 40, 82)}
+    assert "test" not in {trace_example(CAMPAIGN, n)["split"] for n in (0, 20, 40)}
 
 
 def test_what_is_not_there_cannot_be_traced():
     with pytest.raises(RaptorError, match="has simulations 0 to 23, not 24"):
-        trace_simulation(MINI, 24)
-    with pytest.raises(RaptorError, match="has examples 0 to 82; example 83 is not there"):
-        trace_example(MINI, 83)
+        trace_simulation(CAMPAIGN, 24)
+    count = len(read_examples(CAMPAIGN / "examples.csv"))
+    with pytest.raises(RaptorError, match=f"has examples 0 to {count - 1}; example {count} is not there"):
+        trace_example(CAMPAIGN, count)
 
 
 def test_the_command_line_traces():
-    command = [sys.executable, "-c", "from raptor.cli import main; main()", "trace", str(MINI)]
+    command = [sys.executable, "-c", "from raptor.cli import main; main()", "trace", str(CAMPAIGN)]
     done = subprocess.run([*command, "--simulation", "3"], capture_output=True, text=True, check=True)
-    assert yaml.safe_load(done.stdout) == trace_simulation(MINI, 3)
+    assert yaml.safe_load(done.stdout) == trace_simulation(CAMPAIGN, 3)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "give one of --simulation and --example" in done.stderr
 
 
 def test_the_stack_states_seeds_and_model():
-    seeds = {run.simulation: run.seed for run in read_design(MINI / "design" / "design.csv")}
-    samples = read_samples(MINI / "dataset" / "fields.nc", range(24))
+    seeds = {run.simulation: run.seed for run in read_design(CAMPAIGN / "design.csv")}
+    samples = read_samples(CAMPAIGN / "fields.nc", range(24))
     assert {sample.simulation: sample.seed for sample in samples} == seeds
 
 
 @pytest.fixture
 def examples():
-    folder = MINI / "dataset"
-    chosen = read_examples(folder / "examples.csv")[:12]
-    return ExampleSet(folder / "fields.nc", chosen, read_scaling(folder / "normalisation.json"))
+    chosen = read_examples(CAMPAIGN / "examples.csv")[:12]
+    stack = CAMPAIGN / "fields.nc"
+    return ExampleSet(stack, chosen, training_scaling(stack))
 
 
 def test_an_example_is_its_sample_moved_and_scaled(examples):
@@ -99,11 +99,12 @@ def test_the_tutorial_runs():
         [sys.executable, "-c", "\n".join(blocks)], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr[-2000:]
-    assert "83 examples; inputs (5, 64, 64), targets (8, 64, 64)" in done.stdout
+    count = len(read_examples(CAMPAIGN / "examples.csv"))
+    assert f"{count} examples; inputs (5, 64, 64), targets (8, 64, 64)" in done.stdout
 
 
 def test_the_storage_benchmark_prints_its_tables():
-    command = [sys.executable, "-m", "benchmarks.storage", str(MINI), "--samples", "8"]
+    command = [sys.executable, "-m", "benchmarks.storage", str(CAMPAIGN), "--samples", "8"]
     done = subprocess.run([*command, "--channels", "2"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     for text in ("zstd 9", "zlib 1, 15 bits", "reading examples", "training, 2 base channels"):

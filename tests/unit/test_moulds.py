@@ -12,10 +12,7 @@ from raptor.moulds.library import MOULDS
 from raptor.moulds.random_moulds import GROUPS, RandomMoulds
 from raptor.symmetry import Element
 
-RULES = RandomMoulds(
-    (500, 3000), 4, (2, 16), (0.8, 1.5), 4.0, 3.0,
-    {"none": 1, "mirror": 1, "half_turn": 1, "mirrors": 1, "square": 1},
-)  # fmt: skip
+RULES = RandomMoulds(cells=(500, 3000), tethers=(2, 16))
 
 
 def write(path, geometry, **properties):
@@ -32,10 +29,11 @@ SQUARE = polygon((-5, -5), (5, -5), (5, 5), (-5, 5))
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(0, 10**6))
-def test_random_moulds_keep_their_bounds_and_symmetry(seed):
-    mould = RULES.draw(np.random.default_rng(seed), "m")
-    assert mould == RULES.draw(np.random.default_rng(seed), "m")
+@given(st.integers(0, 10**6), st.sampled_from([None, *GROUPS]))
+def test_random_moulds_keep_their_bounds_and_symmetry(seed, symmetry):
+    mould = RULES.draw(np.random.default_rng(seed), 4, "m", symmetry)
+    assert mould == RULES.draw(np.random.default_rng(seed), 4, "m", symmetry)
+    assert symmetry in (None, mould.symmetry)
     assert mould.depression.geom_type == "Polygon"  # connected
     assert 500 <= 4 * mould.depression.area <= 3000
     assert 2 <= len(mould.tethers) <= 16
@@ -62,7 +60,7 @@ def test_the_library_is_known_by_name_in_every_folder(tmp_path, monkeypatch):
 
 
 def test_moulds_survive_writing_and_reading(tmp_path):
-    moulds = [RULES.draw(np.random.default_rng(seed), f"m{seed}") for seed in range(4)]
+    moulds = [RULES.draw(np.random.default_rng(seed), 4, f"m{seed}") for seed in range(4)]
     write_moulds(tmp_path / "moulds.geojson", moulds)
     assert read_moulds(tmp_path / "moulds.geojson") == moulds
 
@@ -157,6 +155,6 @@ def test_a_missing_file_and_several_moulds_are_named(tmp_path):
 
 
 def test_impossible_bounds_of_random_moulds_are_named():
-    rules = RandomMoulds((10, 12), 4, (9, 9), (1.0, 1.0), 4.0, 3.0, {"none": 1})
+    rules = RandomMoulds(cells=(10, 12), tethers=(9, 9))
     with pytest.raises(RaptorError, match="widen the bounds"):
-        rules.draw(np.random.default_rng(0), "m")
+        rules.draw(np.random.default_rng(0), 4, "m")

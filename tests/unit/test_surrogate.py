@@ -8,7 +8,7 @@ import torch
 from pydantic import ValidationError
 
 from raptor.core.errors import RaptorError
-from raptor.dataset.examples import augment, training_scaling
+from raptor.dataset.examples import list_examples, training_scaling
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
 from raptor.moulds import Mould
@@ -127,15 +127,15 @@ def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
 
 @pytest.fixture
 def training(made, tmp_path):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     pix2pix = {"network": "pix2pix", "base_channels": 4, "adversarial": 1.0, "reconstruction_weight": 100.0}
 
     def run(epochs, name, identity="a", initial_weights=None, **changes):
         rules = ModelRules(**pix2pix | {"epochs": epochs, "beta1": 0.5} | changes)
         scaling, splits = training_scaling(stack), read_table(stack).split
         return train(
-            *split_examples([stack], augment(stack), splits, scaling, 32), rules.architecture(32), rules,
-            seed=0, checkpoint=tmp_path / name, identity=identity, initial_weights=initial_weights,
+            *split_examples([stack], list_examples(stack), splits, scaling, 32), rules.architecture(32),
+            rules, seed=0, checkpoint=tmp_path / name, identity=identity, initial_weights=initial_weights,
         )  # fmt: skip
 
     return run
@@ -178,9 +178,9 @@ def test_training_in_bfloat16_keeps_float32_weights(training):
 
 
 def test_examples_kept_in_memory_are_those_read_from_files(made):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     device = torch.device("cpu")
-    kept, read = (ExampleSet([stack], augment(stack), training_scaling(stack)) for _ in range(2))
+    kept, read = (ExampleSet([stack], list_examples(stack), training_scaling(stack)) for _ in range(2))
     kept.keep(device)
     order = torch.randperm(len(read)).tolist()
     batches = list(zip(kept.batches(order, 5, device), read.batches(order, 5, device), strict=True))
@@ -190,9 +190,9 @@ def test_examples_kept_in_memory_are_those_read_from_files(made):
 
 
 def test_a_split_without_examples_is_named(made):
-    stack = made / "dataset" / "fields.nc"
+    stack = made / "fields.nc"
     with pytest.raises(RaptorError, match=r"no validation example; raise design.simulations"):
-        split_examples([stack], augment(stack, ["train"]), read_table(stack).split, SCALING, 32)
+        split_examples([stack], list_examples(stack, ["train"]), read_table(stack).split, SCALING, 32)
 
 
 @pytest.mark.parametrize("network", ["pix2pix_film", "film_unet", "fno"])

@@ -2,84 +2,36 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from raptor.config import Configuration, load
-from raptor.core.errors import RaptorError
-from raptor.dataset.run import simulate_shard
-from raptor.dataset.shards import write_shard
-from raptor.dataset.sweep import Grid, sweep_runs
 from raptor.fields.directors import directors
-from raptor.fields.shape import shape_ratios
 from raptor.plotting import contraction_figure
-from raptor.studies.sweep import compare, differences, measure, middle_points, point_of
+from raptor.studies.sweep import contraction, differences, middle_points, read_panels, shown_deltas, tabulate
 from raptor.symmetry import FIELDS, Element, apply
-from tests.small import MODEL
-
-GRID = Grid((0.2, 0.9), (0.1, 0.7), (0.1, 0.7), seeds=2)
-CORNER = (0.9, 0.1, 0.1)
+from tests.small import CAMPAIGN, build, design
 
 
-@pytest.mark.parametrize("name", ["laptop", "paper"])
-def test_the_hardest_corner_is_swept(pytestconfig, name):
-    sweep = load(pytestconfig.rootpath / "config" / f"{name}.yaml").sweep
-    assert CORNER in sweep.grid().points
-    assert list(sweep.files()) == ["four_post_rectangle", "i_shape"]
-    assert sweep.panels == (0.5, 0.9)
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """A sweep of one mould of the library."""
+    grid = {"delta": [0.2, 0.9], "kappa_nnn": [0.5], "ratio": [0.2, 0.5]}
+    given = design("bench", moulds="small_rectangle", grid=grid, seeds=1, test=None, validation=0, edge=0)
+    return build(tmp_path_factory.mktemp("sweep") / "bench", 4, given)
 
 
-def test_a_sweep_has_every_point_as_often_as_asked_and_seeds_of_its_own(small_mould):
-    runs = sweep_runs(GRID, small_mould, 1)
-    assert [run.simulation for run in runs] == list(range(GRID.size))
-    assert len({run.seed for run in runs}) == GRID.size == 16
-    points = [point_of(run.parameters) for run in runs]
-    assert set(points) == set(GRID.points)
-    assert all(points.count(point) == 2 for point in points)
-    assert runs == sweep_runs(GRID, small_mould, 1)
-    assert {run.seed for run in runs}.isdisjoint(run.seed for run in sweep_runs(GRID, small_mould, 2))
+def test_a_table_holds_the_ratios_of_each_simulation(campaign):
+    table = tabulate(campaign / "fields.nc")
+    assert table["delta"].tolist() == [0.2, 0.2, 0.9, 0.9]
+    assert table["ratio"].tolist() == [0.2, 0.5, 0.2, 0.5]
+    assert table.groupby("delta")["area_ratio"].mean().is_monotonic_decreasing
+    assert set(tabulate(CAMPAIGN / "fields.nc")["simulation"]) == set(range(24))
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        (((0.97,), (0.1,), (0.1,)), "delta is 0.97"),
-        (((0.5,), (0.05,), (0.5,)), "kappa_nnn is 0.05"),
-        (((0.5,), (0.1,), (0.05,)), "kappa_nnnn is 0.005"),
-        (((0.5,), (0.5,), (0.8,)), "above kappa_nnn/sqrt"),
-    ],
-)
-def test_points_outside_of_what_is_learnt_are_refused(values, message):
-    with pytest.raises(RaptorError, match=message):
-        Grid(*values)
-
-
-def test_a_sweep_changes_no_other_fingerprint_nor_do_moulds_and_panels_its_own():
-    plain = Configuration()
-    swept = Configuration.model_validate({"sweep": {"seeds": 3}})
-    drawn = Configuration.model_validate({"sweep": {"panels": [0.9], "moulds": []}})
-    for stage in ("design", "simulation", "dataset"):
-        assert plain.fingerprint(stage) == swept.fingerprint(stage)
-    assert plain.sweep_fingerprint() == drawn.sweep_fingerprint() != swept.sweep_fingerprint()
-
-
-def test_middle_points_are_points():
-    assert middle_points(GRID, (0.9,)) == [(0.9, 0.7, 0.7)]
-    assert set(middle_points(GRID, GRID.deltas)) <= set(GRID.points)
-
-
-def test_measured_are_the_ratios_of_each_simulation(small_mould, tmp_path):
-    runs = sweep_runs(Grid((0.2, 0.9), (0.5,), (0.5,)), small_mould, 1)
-    simulations, _ = simulate_shard(runs, {small_mould.name: small_mould}, MODEL, "draft")
-    write_shard(tmp_path / "0.nc", runs, simulations, MODEL, "draft", "c", {})
-    table = measure([tmp_path / "0.nc"], small_mould, MODEL.layers, 64)
-    assert table["delta"].tolist() == [0.2, 0.9]
-    assert table["area_ratio"].is_monotonic_decreasing
-    from raptor.moulds.cast import CastMould
-    from raptor.raster import rasterise
-
-    s = simulations[1]
-    density = rasterise(s.positions, s.orientation, s.tension, 64)[0]
-    assert table.loc[1, ["area_ratio", "width_ratio"]].tolist() == pytest.approx(
-        shape_ratios(density, CastMould(small_mould, MODEL.layers, 64)), abs=0.01
-    )
+def test_tissues_are_drawn_near_the_papers_deltas(campaign):
+    assert shown_deltas([0.1, 0.45, 0.6, 0.95]) == (0.45, 0.95)
+    assert shown_deltas([0.3]) == (0.3,)
+    panels, thresholds = read_panels(campaign / "fields.nc", "small_rectangle")
+    assert [panel.point for panel in panels] == [(d, 0.5, r) for d in (0.2, 0.9) for r in (0.2, 0.5)]
+    assert list(thresholds) == ["simulated"]
+    assert [panel.point for panel in middle_points(panels)] == [(0.2, 0.5, 0.5), (0.9, 0.5, 0.5)]
 
 
 @pytest.fixture
@@ -98,7 +50,7 @@ def swept():
             "unlike": [False, True, True],
         }
     )  # fmt: skip
-    return compare("one", simulated, predicted)
+    return contraction(*(table.assign(mould="one") for table in (simulated, predicted)))
 
 
 def test_comparison_is_in_per_cent_of_contraction(swept):
@@ -107,7 +59,7 @@ def test_comparison_is_in_per_cent_of_contraction(swept):
     assert area["predicted"].tolist() == pytest.approx([14.0, 60.0, 60.0])
     assert area.loc[0.2, "spread"] == pytest.approx(np.std([10, 20], ddof=1))
     assert area["seeds"].tolist() == [2, 2, 0]
-    assert area["held"].tolist() == [True, False, False]
+    assert area["within_band"].tolist() == [True, False, False]
 
 
 def test_the_largest_difference_and_where_it_is(swept):
@@ -116,7 +68,7 @@ def test_the_largest_difference_and_where_it_is(swept):
     assert found["area"]["largest"]["difference"] == pytest.approx(10.0)
     assert found["area"]["largest"]["delta"] == 0.9
     assert found["area"]["mean_absolute"] == pytest.approx(5.5)
-    assert found["area"]["held"] == 0.5
+    assert found["area"]["within_band"] == 0.5
     assert found["width"]["points"] == 1
     assert found["width"]["largest"]["difference"] == pytest.approx(10.0)
 

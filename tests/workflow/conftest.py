@@ -6,7 +6,11 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 
+from raptor.config import load, require_castable, require_measurable
+from raptor.core.errors import RaptorError
+from raptor.moulds.library.tissues import load_tissues
 from tests.small import ROOT
 
 TINY = ROOT / "tests" / "workflow" / "config" / "tiny.yaml"
@@ -40,11 +44,36 @@ class Workplace:
         return set(re.findall(r"^(?:local)?rule (\w+):", done.stderr + done.stdout, re.MULTILINE))
 
 
-def pytest_collection_modifyitems(items):
-    """What looks at the tiny run is one group, so that one worker makes it, once, beside the other tests."""
-    for item in items:
-        if "finished" in item.fixturenames:
-            item.add_marker(pytest.mark.xdist_group("finished"))
+class Parsed:
+    """What the Snakefile does with a configuration before any rule is read, without a Snakemake."""
+
+    Error = RaptorError
+
+    def __call__(self, path):
+        configuration = load(path)
+        require_castable(configuration)
+        tissues = load_tissues(configuration.fit.tissues_file, configuration.fit.tissues)
+        require_measurable(tissues, configuration.mould_scale)
+        return configuration
+
+
+@pytest.fixture
+def parsed():
+    return Parsed()
+
+
+def variant(tmp_path, **changes):
+    """The tiny configuration with other values, keys given as block__key."""
+    content = yaml.safe_load(TINY.read_text())
+    for key, value in changes.items():
+        block, _, name = key.partition("__")
+        if name:
+            content.setdefault(block, {})[name] = value
+        else:
+            content[block] = value
+    path = tmp_path / "variant.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -7,21 +7,27 @@ import yaml
 
 from raptor.moulds.library import TISSUES
 from tests.small import ROOT
-from tests.workflow.conftest import TINY
-from tests.workflow.test_end_to_end import variant
+from tests.workflow.conftest import TINY, variant
 
-EVERYTHING = {
-    "all", "record_configuration", "compile_kernels", "sample_design", "simulate_shard", "build_stack",
-    "augment_dataset", "check_dataset", "write_card", "train_member", "assemble_model",
-    "design_further", "enrich", "simulate_further", "stack_further", "measure_floor", "evaluate_model",
-    "evaluate_baseline", "compare_models", "summarise_evaluation", "plot_calibration", "plot_regions",
-    "plot_worst", "plot_models", "plot_enrichment", "ship",
-    "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "simulate_unmeasured",
-    "plot_valley", "tabulate_fits", "measure_tradeoff", "plot_design", "plot_fields", "plot_bulk",
-    "plot_training", "plot_fit", "plot_tradeoff", "tabulate_tradeoff", "plot_folding", "report",
-    "design_sweep", "simulate_sweep", "measure_sweep", "predict_sweep", "compare_sweep", "plot_contraction",
-    "plot_panels", "plot_directors", "write_report",
+PAPER = "results/tiny/campaigns/paper/fields.nc"
+
+CHAIN = {
+    "compile_kernels", "design_campaign", "simulate_shard", "build_stack", "list_examples", "check_campaign",
+    "write_card", "check_splits",
 }  # fmt: skip
+"""What makes every campaign, whatever its kind."""
+TRAINING = {"fit_scaling", "train_member", "assemble_model"}
+EVALUATION = {
+    "measure_floor", "evaluate_model", "summarise_evaluation", "compare_models", "predict_samples",
+    "ship_model",
+}  # fmt: skip
+SWEEPS = {"tabulate_campaign", "predict_campaign", "compare_contraction"}
+TRADEOFF = {"measure_tradeoff", "tabulate_tradeoff", "plot_folding"}
+FITS = {"fit_tissue", "fit_by_simulator", "infer_parameters", "fit_outline", "tabulate_fits"}
+REPORT = {"record_configuration", "write_report", "report", "all"}
+EVERYTHING = (
+    CHAIN | TRAINING | EVALUATION | SWEEPS | TRADEOFF | FITS | REPORT | {"plot_tables", "plot_fields"}
+)
 
 
 @pytest.fixture
@@ -48,31 +54,37 @@ def test_a_lost_report_is_written_again(place):
         assert (folder / name).stat().st_size > 10**5
 
 
-def test_another_target_of_the_fit_runs_no_simulation(place, tmp_path):
+def test_another_measurement_runs_no_campaign(place, tmp_path):
     tissues = yaml.safe_load(TISSUES.read_text())
     tissues["glial_1"]["area_ratio"] = 0.7
     path = tmp_path / "tissues.yaml"
     path.write_text(yaml.safe_dump(tissues))
     jobs = place.jobs(configuration=variant(tmp_path, fit__tissues_file=str(path)))
-    assert jobs == {
-        "record_configuration", "fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint",
-        "fit_outline", "tabulate_fits", "plot_fit", "plot_valley", "write_report", "report", "all",
-    }  # fmt: skip
+    assert jobs == FITS | REPORT | {"plot_fields", "plot_tables"}
 
 
 @pytest.mark.parametrize(
     ("change", "not_again"),
     [
         (
-            {"surrogate__epochs": 3},
-            {"sample_design", "simulate_shard", "build_stack", "check_dataset"},
+            {"models__film_unet": {"base_channels": 4, "epochs": 3, "pixels": 16}},
+            CHAIN
+            - {
+                "design_campaign",
+                "simulate_shard",
+                "build_stack",
+                "list_examples",
+                "check_campaign",
+                "write_card",
+                "check_splits",
+            },
         ),
-        ({"fields__pixels": 64}, {"sample_design", "simulate_shard"}),
-        ({"sweep__seeds": 2}, {"simulate_shard", "train_member", "fit_tissue", "measure_tradeoff"}),
-        ({"tradeoff__seeds": 5}, {"simulate_shard", "train_member", "fit_tissue", "plot_fit"}),
-        ({"fit__error": 0.02}, {"simulate_shard", "train_member", "fit_tissue", "fit_by_simulator"}),
-        ({"fit__simulations": 6}, {"train_member", "fit_tissue", "infer_parameters", "fit_outline"}),
-        ({"simulation__accuracy": "standard"}, {"sample_design", "compile_kernels", "plot_design"}),
+        ({"tradeoff__methods": ["draft"]}, CHAIN | TRAINING | FITS | SWEEPS),
+        (
+            {"fit__simulations": 6},
+            CHAIN | TRAINING | SWEEPS | {"fit_tissue", "infer_parameters", "fit_outline"},
+        ),
+        ({"accuracy": "standard"}, {"compile_kernels"}),
         ({"seed": 1}, {"compile_kernels"}),
     ],
     ids=lambda value: str(next(iter(value))) if isinstance(value, dict) else "",
@@ -83,33 +95,70 @@ def test_a_change_runs_what_hangs_on_it_and_no_more(place, tmp_path, change, not
     assert not jobs & not_again
 
 
-def test_targets_make_their_part(workplace):
-    place = workplace("targets")
-    assert "train_member" not in place.jobs("dataset")
-    assert "evaluate_model" not in place.jobs("train")
-    assert {"evaluate_model", "train_member"} <= place.jobs("evaluate")
-    assert {"simulate_sweep", "plot_contraction", "plot_panels", "plot_directors"} <= place.jobs("sweep")
-    fits = {"fit_tissue", "fit_by_simulator", "infer_parameters", "fit_joint", "fit_outline", "plot_valley"}
-    assert fits <= place.jobs("fit")
-    assert {"measure_tradeoff", "plot_tradeoff"} <= place.jobs("tradeoff")
-    assert {"plot_fields", "plot_bulk"} <= place.jobs("figures")
-    assert place.jobs("report") == EVERYTHING - {"all"}
+@pytest.mark.parametrize(
+    ("change", "jobs"),
+    [
+        ({"pixels": 64}, CHAIN - {"compile_kernels", "design_campaign", "simulate_shard", "check_splits"}),
+        ({"shard_size": 2}, CHAIN - {"compile_kernels", "design_campaign", "check_splits"}),
+        ({"check_fraction": 0.5}, {"check_campaign"}),
+        ({"models__pix2pix": {"epochs": 1}}, set()),
+    ],
+    ids=lambda value: str(next(iter(value))) if isinstance(value, dict) else "",
+)
+def test_a_change_makes_its_part_of_a_campaign_again(place, tmp_path, change, jobs):
+    found = place.jobs("campaign_paper", configuration=variant(tmp_path, **change))
+    assert found - {"campaign_paper", "tabulate_campaign"} == jobs
+
+
+def test_a_further_campaign_leaves_the_others_alone(place, tmp_path):
+    mine = {"moulds": "glial_1", "grid": {"delta": [0.5], "kappa_nnn": [0.5], "ratio": [0.5]}}
+    jobs = place.jobs(configuration=variant(tmp_path, campaigns__mine=mine))
+    assert jobs == (CHAIN - {"compile_kernels"}) | SWEEPS | REPORT | {"plot_fields", "plot_tables"}
+
+
+@pytest.mark.parametrize(
+    ("target", "needed", "not_needed"),
+    [
+        ("campaign_paper", CHAIN - {"check_splits"} | {"tabulate_campaign"}, TRAINING | {"check_splits"}),
+        ("results/tiny/studies/sweep/simulated.csv", {"tabulate_campaign"}, TRAINING),
+        ("campaigns", CHAIN, EVALUATION | FITS),
+        ("train", TRAINING, EVALUATION | FITS),
+        ("evaluate", EVALUATION - {"predict_samples"}, FITS | SWEEPS),
+        ("studies", SWEEPS | {"plot_tables", "plot_fields"}, FITS | EVALUATION),
+        ("fit", FITS, SWEEPS),
+        ("tradeoff", TRADEOFF | {"plot_tables"}, FITS | SWEEPS),
+        ("figures", {"predict_samples", "plot_tables", "plot_fields", "plot_folding"}, {"ship_model"}),
+        ("report", EVERYTHING - {"all"}, set()),
+    ],
+    ids=lambda value: value.rpartition("/")[2] if isinstance(value, str) else "",
+)
+def test_a_target_makes_its_part(workplace, target, needed, not_needed):
+    jobs = workplace("targets").jobs(target)
+    assert needed <= jobs
+    assert not not_needed & jobs
 
 
 def test_parts_that_are_not_asked_for_are_left_out(workplace, tmp_path):
-    jobs = workplace("no_sweep").jobs(configuration=variant(tmp_path, sweep__moulds=[]))
-    assert {name for name in EVERYTHING - jobs if "sweep" in name} == {n for n in EVERYTHING if "sweep" in n}
-    assert "write_report" in jobs
+    content = yaml.safe_load(TINY.read_text())
+    campaigns = {"paper": content["campaigns"]["paper"]}
+    changes = {"campaigns": campaigns, "models": {}, "tradeoff": {"cases": {}}, "fit": {"joint": []}}
+    jobs = workplace("plain").jobs(configuration=variant(tmp_path, **changes))
+    assert jobs == CHAIN | REPORT | {"plot_tables"}
+
+
+def test_several_tissues_are_fitted_together_too(workplace, tmp_path):
+    changes = {"fit__tissues": ["glial_1", "glial_3"], "fit__joint": ["glial_1", "glial_3"]}
+    assert workplace("joint").jobs("fit", configuration=variant(tmp_path, **changes)) >= FITS | {"fit_joint"}
 
 
 def test_a_gpu_s_profile_asks_for_it_where_it_is_used(workplace):
     place = workplace("gpu")
     profile = str(ROOT / "workflow" / "profiles" / "gpu")
-    done = place.run("--dry-run", "--cores", "4", "--workflow-profile", profile, "dataset")
+    done = place.run("--dry-run", "--cores", "4", "--workflow-profile", profile, PAPER)
     assert done.returncode == 0, done.stderr
     shown = done.stdout + done.stderr
     assert shown.count("gpu=1") >= 4  # three shards and the stack
-    laid_over = place.command("--dry-run", "dataset")
+    laid_over = place.command("--dry-run", PAPER)
     laid_over.insert(laid_over.index(str(TINY)) + 1, str(ROOT / "config" / "gpu.yaml"))
     done = subprocess.run(laid_over, capture_output=True, text=True, check=False, cwd=place.folder)
     assert done.returncode == 0, done.stderr

@@ -10,13 +10,14 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-import yaml
 from safetensors.numpy import load_file
 
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
 from raptor.symmetry import FIELDS
-from tests.workflow.conftest import TINY
+from tests.workflow.conftest import variant
+
+CAMPAIGNS = {"paper", "replicates", "soft_corner", "active", "sweep"}
 
 
 @pytest.fixture
@@ -35,36 +36,38 @@ def test_the_run_ends_with_the_report(results):
         "tradeoff.png",
         "design.png",
         "fit_glial_1.png",
-        "contraction.png",
-        "panels_i_shape.png",
-        "directors.png",
+        "contraction_sweep.png",
+        "panels_sweep_i_shape.png",
+        "directors_sweep.png",
         "valley_glial_1.png",
     ):
         assert name in text
-    for name in ("card.md", "fits.csv", "metrics.csv", "configuration.yaml", "tradeoff.csv", "joint.csv"):
+    for name in ("card.md", "fits.csv", "regions.csv", "configuration.yaml", "summary.csv"):
         assert name in text
 
 
-def test_the_data_set_is_sound_and_opens_with_xarray(results):
+def test_the_campaigns_are_sound_and_open_with_xarray(results):
     assert check(results) == []
-    with xr.open_dataset(results / "dataset" / "fields.nc") as stack:
+    with xr.open_dataset(results / "campaigns" / "paper" / "fields.nc") as stack:
         assert dict(stack.sizes) == {"sample": 8, "field": 8, "y": 32, "x": 32}
         assert [str(f) for f in stack["field"].values] == list(FIELDS)
         assert float(stack["fields"].sel(field="density").sum()) == pytest.approx(
             int(stack["n_cells"].sum()), rel=1e-4
         )
-    examples = pd.read_csv(results / "dataset" / "examples.csv")
-    with xr.open_dataset(results / "dataset" / "augmented.nc") as augmented:
-        assert augmented.sizes["sample"] == len(examples)
-        assert (augmented["element"].values == examples["element"]).all()
+    assert {path.name for path in (results / "campaigns").iterdir() if path.is_dir()} == CAMPAIGNS
+    for name in CAMPAIGNS:
+        made = {path.name for path in (results / "campaigns" / name).iterdir()}
+        assert made == {
+            "design.csv", "moulds.geojson", "shards", "fields.nc", "examples.csv", "card.md", "checked.txt",
+        }  # fmt: skip
 
 
 def test_every_file_says_what_it_is(results):
     for path in [
-        *results.glob("simulations/*.nc"),
-        *results.glob("dataset/*.nc"),
-        *results.glob("fits/*.nc"),
-        *results.glob("sweeps/*/*.nc"),
+        *results.glob("campaigns/*/shards/*.nc"),
+        *results.glob("campaigns/*/fields.nc"),
+        *results.glob("studies/*/predicted.nc"),
+        results / "fits" / "glial_1.nc",
     ]:
         with netCDF4.Dataset(path) as file:
             for name in (
@@ -84,55 +87,53 @@ def test_every_file_says_what_it_is(results):
 def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     weights = load_file(results / "surrogate" / "film_unet" / "weights.safetensors")
     assert all(np.isfinite(value).all() for value in weights.values())
-    assert {name.split(".")[0] for name in weights} == {"0", "1", "novelty"}
+    assert {name.split(".")[0] for name in weights} == {"0", "1", "training_descriptors"}
     history = pd.read_csv(results / "surrogate" / "film_unet" / "training.csv")
     assert history[["member", "epoch"]].values.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
-    enriched = pd.read_csv(results / "surrogate" / "enriched" / "training.csv")
-    assert enriched["epoch"].tolist() == [0, 1, 2]
-    assert enriched["distance"].tolist()[:2] == history["distance"].tolist()[:2]
-    candidates = pd.read_csv(results / "further" / "enriched" / "candidates.csv")
-    assert candidates["chosen"].sum() == 2
+    active = pd.read_csv(results / "surrogate" / "active" / "training.csv")
+    assert active["epoch"].tolist() == [0, 1, 2]
+    assert active["distance"].tolist()[:2] == history["distance"].tolist()[:2]
+    selected = pd.read_csv(results / "campaigns" / "active" / "design.csv")
+    assert selected["split"].tolist() == ["train", "train"]
+    assert (selected["disagreement"] > 0).all()
     metrics = json.loads((results / "evaluation" / "film_unet" / "metrics.json").read_text())
-    assert set(metrics) == {"test", "corner"}
-    assert metrics["test"]["samples"] == 2
-    assert set(metrics["test"]["bulk"]) == {
+    assert set(metrics) == {"paper", "soft_corner"}
+    assert metrics["paper"]["samples"] == 2
+    assert set(metrics["paper"]["bulk"]) == {
         "P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar", "area_ratio", "width_ratio",
     }  # fmt: skip
-    assert all(0 <= share <= 1 for share in metrics["test"]["coverage"].values())
+    assert all(0 <= share <= 1 for share in metrics["paper"]["coverage"].values())
     floor = pd.read_csv(results / "evaluation" / "floor.csv")
     assert floor["runs"].tolist() == [3]
     assert (floor["vrmse_density"] > 0).all()
     models = pd.read_csv(results / "evaluation" / "models.csv").set_index("model")
-    assert models.index.tolist() == ["film_unet", "pix2pix", "enriched", "nearest", "mean"]
+    assert models.index.tolist() == ["film_unet", "pix2pix", "active", "nearest", "mean"]
     assert (models.loc[["film_unet", "pix2pix"], "training_core_minutes"] > 0).all()
     assert models["density_in_floors"].notna().all()
     regions = pd.read_csv(results / "evaluation" / "film_unet" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
-    assert regions.loc["further: corner", "samples"] == 2
+    assert regions.loc["campaign: soft_corner", "samples"] == 2
     card = (results / "shipped" / "card.md").read_text()
     assert "| density |" in card
-    assert "further: corner" in card
+    assert "campaign: soft_corner" in card
     shipped = load_file(results / "shipped" / "weights.safetensors")
     assert shipped.keys() == weights.keys()
     fit = json.loads((results / "fits" / "glial_1.json").read_text())
     assert fit["simulation"]["rss"] >= 0
-    assert fit["simulation"]["runs"] == 2
+    assert fit["simulation"]["runs"] == 4
     by_simulator = json.loads((results / "fits" / "glial_1_simulator.json").read_text())
     assert by_simulator["fit"]["evaluations"] <= 5
     posterior = json.loads((results / "fits" / "glial_1_posterior.json").read_text())
     for parameter in posterior["parameters"].values():
         assert parameter["quantiles"]["0.025"] <= parameter["mean"] <= parameter["quantiles"]["0.975"]
-    assert len(pd.read_csv(results / "fits" / "glial_1_draws.csv")) == 5
+    assert len(pd.read_csv(results / "fits" / "glial_1_draws.csv")) == 8
     further = pd.read_csv(results / "fits" / "glial_1_further.csv")
     assert {"outline", "alignment", "tension", "thickness"} <= set(further["measurement"])
-    joint = pd.read_csv(results / "fits" / "joint.csv").set_index("fit")
-    assert {"joint", "joint, simulator", "separate, mean", "paper, mean"} <= set(joint.index)
     outline = json.loads((results / "fits" / "glial_1_outline.json").read_text())
     assert outline["outline"]["distance"] >= 0
     table = pd.read_csv(results / "fits" / "fits.csv").set_index("tissue")
     assert (table[["surrogate_again_rss", "corrected_again_rss", "simulator_again_rss"]] >= 0).all(axis=None)
-    assert len(pd.read_csv(results / "fits" / "myoblast_bound.csv")) == 5
     tradeoff = pd.read_csv(results / "tradeoff" / "tradeoff.csv")
     others = ["draft", "anneal-20", "1 layers", "shells 1 2 4", "16 pixels", "surrogate"]
     assert tradeoff["method"].tolist() == [f"reference, seed {n}" for n in range(1, 5)] + others
@@ -144,14 +145,14 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
 
 
 def test_sweeps_are_simulated_and_predicted_at_every_point(results):
-    table = pd.read_csv(results / "sweeps" / "contraction.csv")
+    table = pd.read_csv(results / "studies" / "sweep" / "contraction.csv")
     assert len(table) == 2 * 2 * 4  # moulds, measures, points
     assert set(table["mould"]) == {"four_post_rectangle", "i_shape"}
     assert table[["simulated", "predicted", "band95"]].notna().all().all()
     assert ((table["delta"] == 0.9) & (table["kappa_nnn"] == 0.1) & (table["ratio"] == 0.1)).any()
     weak, strong = (table[table["delta"] == delta]["simulated"].mean() for delta in (0.2, 0.9))
     assert strong > weak
-    found = json.loads((results / "sweeps" / "differences.json").read_text())
+    found = json.loads((results / "studies" / "sweep" / "differences.json").read_text())
     assert [(entry["mould"], entry["measure"]) for entry in found] == list(
         dict.fromkeys(zip(table["mould"], table["measure"], strict=True))
     )
@@ -164,48 +165,36 @@ def test_sweeps_are_simulated_and_predicted_at_every_point(results):
 def test_every_figure_has_its_data(results):
     for figure in (
         "design", "fields", "bulk", "training", "calibration", "regions", "worst", "models", "tradeoff",
-        "folding", "fit_glial_1", "valley_glial_1", "contraction", "panels_four_post_rectangle",
-        "panels_i_shape", "directors",
+        "folding", "fit_glial_1", "valley_glial_1", "active_learning", "contraction_sweep",
+        "panels_sweep_four_post_rectangle", "panels_sweep_i_shape", "directors_sweep",
     ):  # fmt: skip
         made = {path.suffix for path in (results / "figures").glob(f"{figure}.*")}
         assert {".png", ".svg"} <= made
         assert made & {".csv", ".nc"}
 
 
-def variant(tmp_path, **changes):
-    """The tiny configuration with other values, keys given as block__key."""
-    content = yaml.safe_load(TINY.read_text())
-    for key, value in changes.items():
-        block, _, name = key.partition("__")
-        if name:
-            content.setdefault(block, {})[name] = value
-        else:
-            content[block] = value
-    path = tmp_path / "variant.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path
-
-
 def test_one_core_and_other_shards_give_the_same_data(results, workplace, tmp_path):
+    paper = results / "campaigns" / "paper"
     for cores, size in ((1, 1), (2, 8)):
         place = workplace(f"cores{cores}")
         done = place.run(
             "--cores",
             str(cores),
-            "dataset",
-            configuration=variant(tmp_path, simulation__shard_size=size),
+            "campaign_paper",
+            configuration=variant(tmp_path, shard_size=size),
         )
         assert done.returncode == 0, done.stderr[-2000:]
-        assert differences(results, place.folder / "results" / "tiny") == []
+        assert differences(paper, place.folder / "results" / "tiny" / "campaigns" / "paper") == []
 
 
 def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     """SIGKILL to everything, twice: among simulations and in training."""
     place = workplace("killed")
     folder = place.folder / "results" / "tiny"
-    for seen in ("simulations/00000-00002.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
+    target = "results/tiny/surrogate/film_unet/weights.safetensors"
+    for seen in ("campaigns/paper/shards/00000-00002.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
         run = subprocess.Popen(
-            place.command("--cores", "2", "--nolock", "--rerun-incomplete", "train"),
+            place.command("--cores", "2", "--nolock", "--rerun-incomplete", target),
             cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         deadline = time.monotonic() + 300
@@ -215,9 +204,10 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
             time.sleep(0.005)
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
-    done = place.run("--cores", "2", "train")
+    done = place.run("--cores", "2", target)
     assert done.returncode == 0, done.stderr[-2000:]
-    assert differences(results, folder) == []
+    campaigns = [each / "campaigns" / "paper" for each in (results, folder)]
+    assert differences(*campaigns) == []
     weights = [load_file(f / "surrogate" / "film_unet" / "weights.safetensors") for f in (results, folder)]
     assert all(np.array_equal(weights[0][name], weights[1][name]) for name in weights[0])
 
@@ -226,12 +216,14 @@ def test_a_truncated_shard_stops_the_run_with_one_sentence(results, workplace):
     place = workplace("truncated")
     shutil.copytree(results.parents[1] / "results", place.folder / "results")
     shutil.copytree(results.parents[1] / ".snakemake", place.folder / ".snakemake")
-    shard = next((place.folder / "results" / "tiny" / "simulations").glob("*.nc"))
+    paper = place.folder / "results" / "tiny" / "campaigns" / "paper"
+    target = "campaign_paper"
+    shard = next((paper / "shards").glob("*.nc"))
     shard.write_bytes(shard.read_bytes()[:2000])
-    done = place.run("--cores", "1", "dataset")
+    done = place.run("--cores", "1", target)
     assert done.returncode != 0
     assert f"{shard.name} is truncated or damaged" in done.stderr + done.stdout
     shard.unlink()
-    done = place.run("--cores", "2", "dataset")
+    done = place.run("--cores", "2", target)
     assert done.returncode == 0
-    assert differences(results, place.folder / "results" / "tiny") == []
+    assert differences(results / "campaigns" / "paper", paper) == []

@@ -124,10 +124,10 @@ def test_the_report_reads_from_the_question_to_the_rebuilding(results):
 
 def test_captions_quote_the_run(results):
     text = (results / "report.html").read_text()
-    (width, *_) = json.loads((results / "sweeps" / "differences.json").read_text())
+    (width, *_) = json.loads((results / "studies" / "sweep" / "differences.json").read_text())
     assert f"{number(abs(width['largest']['difference']))} (Four post rectangle, central width)" in text
     metrics = json.loads((results / "evaluation" / "film_unet" / "metrics.json").read_text())
-    assert f"{100 * metrics['test']['fields']['density']['vrmse']:.0f} %" in text
+    assert f"{100 * metrics['paper']['fields']['density']['vrmse']:.0f} %" in text
     assert not re.search(
         r"\b(nan|None)\b", re.sub(r"<pre>.*?</pre>|base64,[^\"]*", "", text, flags=re.DOTALL)
     )

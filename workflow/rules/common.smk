@@ -6,12 +6,12 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from raptor import config as configuration
-from raptor.core.version import MODEL_VERSION
-from raptor.surrogate.baselines import BASELINES
 from raptor.core.compiled import source_hash
 from raptor.core.errors import RaptorError
-from raptor.moulds.library.tissues import load_tissues, require_measured
+from raptor.core.version import MODEL_VERSION
+from raptor.moulds.library.tissues import load_tissues
 from raptor.moulds.reading import find_mould
+from raptor.surrogate.baselines import BASELINES
 
 if "name" not in config:
     raise WorkflowError(
@@ -19,68 +19,27 @@ if "name" not in config:
     )
 try:
     CONFIG = configuration.parse(config, "configuration")
-    TISSUES = load_tissues(CONFIG.fit.tissues_file, CONFIG.fit.tissues)
-    UNMEASURED = load_tissues(CONFIG.fit.tissues_file, CONFIG.fit.unmeasured)
-    require_measured(TISSUES, UNMEASURED)
-    configuration.require_measurable(TISSUES | UNMEASURED, CONFIG.fit.mould_scale)
-    configuration.require_castable(CONFIG.tradeoff.cases, CONFIG.sweep)
+    configuration.require_castable(CONFIG)
+    MODELS = CONFIG.models
+    TISSUES = load_tissues(
+        CONFIG.fit.tissues_file, CONFIG.fit.tissues if MODELS else ()
+    )
+    configuration.require_measurable(TISSUES, CONFIG.mould_scale)
 except RaptorError as error:
     raise WorkflowError(str(error))
-config.update(CONFIG.model_dump(mode="json"))  # captions see the defaults too
 
 RESULTS = f"results/{CONFIG.name}"
-CASES = {case.name: case for case in CONFIG.tradeoff.cases}
-MODELS = CONFIG.models
-ENRICHED = [name for name, model in MODELS.items() if model.extra]
-SETS = CONFIG.further_sets
-SWEEPS = CONFIG.sweep.files()
-JUDGED = ["test", *(name for name in ("bars", "slender", "corner") if name in SETS)]
-FIGURES = (
-    "design",
-    "fields",
-    "bulk",
-    "training",
-    "calibration",
-    "regions",
-    "worst",
-    "models",
-    "tradeoff",
-    *(["enrichment"] if ENRICHED else []),
-)
+CAMPAIGN = f"{RESULTS}/campaigns/{{campaign}}"
+STUDY = f"{RESULTS}/studies/{{campaign}}"
+CAMPAIGNS = CONFIG.campaigns
+SWEEPS = [name for name, campaign in CAMPAIGNS.items() if campaign.grid]
+CASES = CONFIG.tradeoff.cases
 
 
 wildcard_constraints:
+    campaign="|".join(CAMPAIGNS),
     shard=r"\d+-\d+",
-    tissue="|".join(CONFIG.fit.tissues),
-    unmeasured="|".join(CONFIG.fit.unmeasured) or "none",
-    figure="|".join(FIGURES),
-    case="|".join(CASES),
     model="|".join([*MODELS, *BASELINES]),
     member=r"\d+",
-    set="|".join(["test", *SETS]),
-    sweep="|".join(SWEEPS),
-
-
-localrules:
-    record_configuration,
-
-
-rule record_configuration:
-    """Write the configuration as it was understood, defaults included, for the report."""
-    output:
-        configuration=report(
-            f"{RESULTS}/configuration.yaml",
-            caption="../report/configuration.rst",
-            category="Configuration",
-        ),
-    log:
-        f"{RESULTS}/logs/record_configuration.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/record_configuration.tsv"
-    threads: 1
-    resources:
-        mem_mb=200,
-    params:
-        configuration=CONFIG.model_dump(mode="json"),
-    script:
-        "../scripts/record_configuration.py"
+    tissue="|".join(TISSUES) or "none",
+    case="|".join(CASES) or "none",

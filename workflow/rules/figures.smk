@@ -1,253 +1,235 @@
-"""Every figure, with the data that it draws beside it."""
+"""Every figure, with the data that it draws beside it; no job here predicts or trains."""
+
+FIGURE = f"{RESULTS}/figures/{{figure}}"
 
 
-rule plot_design:
-    """Distributions of parameters and moulds."""
-    input:
-        design=rules.sample_design.output.design,
-        moulds=rules.sample_design.output.moulds,
-    output:
-        png=report(
-            f"{RESULTS}/figures/design.png",
-            caption="../report/plot_design.rst",
-            category="Data set",
+# Figures that draw tables, by name.
+FIRST = CONFIG.training_campaign or next(iter(CAMPAIGNS))
+TABLE_FIGURES = {
+    "design": dict(
+        kind="design",
+        inputs={
+            "design": f"{RESULTS}/campaigns/{FIRST}/design.csv",
+            "moulds": f"{RESULTS}/campaigns/{FIRST}/moulds.geojson",
+        },
+    )
+}
+for campaign in SWEEPS:
+    TABLE_FIGURES[f"contraction_{campaign}"] = dict(
+        kind="contraction",
+        inputs={
+            "table": expand(rules.compare_contraction.output.table, campaign=campaign)[
+                0
+            ]
+        },
+    )
+if CASES:
+    TABLE_FIGURES["tradeoff"] = dict(
+        kind="tradeoff", inputs={"table": rules.tabulate_tradeoff.output.table}
+    )
+# Figures that draw fields.
+FIELD_FIGURES = {}
+for campaign in SWEEPS:
+    drawn = {
+        "stack": expand(rules.build_stack.output.stack, campaign=campaign)[0],
+        "moulds": expand(rules.design_campaign.output.moulds, campaign=campaign)[0],
+        "predicted": (
+            expand(rules.predict_campaign.output.fields, campaign=campaign)
+            if MODELS
+            else []
         ),
-        svg=f"{RESULTS}/figures/design.svg",
-        data=f"{RESULTS}/figures/design.csv",
+    }
+    FIELD_FIGURES[f"directors_{campaign}"] = dict(kind="directors", inputs=drawn)
+    for mould in CAMPAIGNS[campaign].files():
+        FIELD_FIGURES[f"panels_{campaign}_{mould}"] = dict(
+            kind="panels", inputs=drawn, options={"mould": mould}
+        )
+if MODELS:
+    errors = {name: files[0] for name, files in ERRORS.items()}
+    TABLE_FIGURES |= {
+        "bulk": dict(
+            kind="bulk",
+            inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
+            options={"campaign": CONFIG.training_campaign},
+        ),
+        "training": dict(kind="training", inputs={"history": SURROGATE["history"][0]}),
+        "calibration": dict(
+            kind="calibration",
+            inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
+            options={"campaign": CONFIG.training_campaign},
+        ),
+        "regions": dict(
+            kind="regions",
+            inputs={"metrics": errors["metrics"], "regions": errors["regions"]},
+        ),
+        "models": dict(
+            kind="models",
+            inputs={
+                "table": rules.compare_models.output.table,
+                "histories": expand(rules.assemble_model.output.history, model=MODELS),
+            },
+            options={"models": list(MODELS)},
+        ),
+    }
+    tuned = [name for name, model in MODELS.items() if len(model.campaigns) > 1]
+    if tuned:
+        TABLE_FIGURES["active_learning"] = dict(
+            kind="active_learning",
+            inputs={"regions": rules.compare_models.output.regions},
+            options={
+                "models": [
+                    MODELS[tuned[0]].initial_weights or next(iter(MODELS)),
+                    *tuned,
+                ]
+            },
+        )
+    samples = {
+        "samples": rules.predict_samples.output.samples,
+        "moulds": expand(rules.design_campaign.output.moulds, campaign=TRAINING)[0],
+    }
+    FIELD_FIGURES |= {
+        "fields": dict(kind="fields", inputs=samples),
+        "worst": dict(kind="worst", inputs=samples),
+    }
+for tissue in TISSUES:
+    fitted = rules.fit_tissue.output
+    inferred = rules.infer_parameters.output
+    TABLE_FIGURES[f"valley_{tissue}"] = dict(
+        kind="valley",
+        inputs={
+            name: expand(path, tissue=tissue)[0]
+            for name, path in (
+                ("fit", fitted.fit),
+                ("posterior", inferred.posterior),
+                ("points", inferred.points),
+                ("draws", inferred.draws),
+                ("further", inferred.further),
+            )
+        },
+    )
+    simulator = rules.fit_by_simulator.output if tissue in BY_SIMULATOR else None
+    FIELD_FIGURES[f"fit_{tissue}"] = dict(
+        kind="fit",
+        inputs={
+            "fit": expand(fitted.fit, tissue=tissue)[0],
+            "tissue": expand(fitted.tissue, tissue=tissue)[0],
+            "prediction": expand(fitted.prediction, tissue=tissue)[0],
+            "other_fit": expand(simulator.fit, tissue=tissue) if simulator else [],
+            "other_tissue": (
+                expand(simulator.tissue, tissue=tissue) if simulator else []
+            ),
+        },
+    )
+
+
+rule plot_tables:
+    """Draw a figure from tables: designs, errors, training, contraction, trade-off, what fits leave open."""
+    input:
+        unpack(lambda wildcards: TABLE_FIGURES[wildcards.figure]["inputs"]),
+    output:
+        png=report(f"{FIGURE}.png", category="Figures", labels={"figure": "{figure}"}),
+        svg=f"{FIGURE}.svg",
+        data=f"{FIGURE}.csv",
     log:
-        f"{RESULTS}/logs/plot_design.log",
+        f"{RESULTS}/logs/plot_tables/{{figure}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/plot_design.tsv"
+        f"{RESULTS}/benchmarks/plot_tables/{{figure}}.tsv"
+    wildcard_constraints:
+        figure="|".join(TABLE_FIGURES),
     threads: 1
     resources:
-        mem_mb=800,
-    script:
-        "../scripts/plot_design.py"
-
-
-rule plot_fields:
-    """The paper's figure: eight fields of a held-out mould, simulation beside prediction."""
-    input:
-        stack=rules.build_stack.output.stack,
-        moulds=rules.sample_design.output.moulds,
-        metrics=ERRORS["metrics"],
-        weights=SURROGATE["weights"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/fields.png",
-            caption="../report/plot_fields.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/fields.svg",
-        data=f"{RESULTS}/figures/fields.nc",
-    log:
-        f"{RESULTS}/logs/plot_fields.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_fields.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_fields.py"
-
-
-rule plot_bulk:
-    """The paper's figure: eight bulk statistics, predicted against simulated."""
-    input:
-        metrics=ERRORS["metrics"],
-        summary=ERRORS["summary"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/bulk.png",
-            caption="../report/plot_bulk.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/bulk.svg",
-        data=f"{RESULTS}/figures/bulk.csv",
-    log:
-        f"{RESULTS}/logs/plot_bulk.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_bulk.tsv"
-    threads: 1
-    resources:
-        mem_mb=800,
-    script:
-        "../scripts/plot_bulk.py"
-
-
-rule plot_training:
-    """Losses and validation error, epoch by epoch."""
-    input:
-        history=SURROGATE["history"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/training.png",
-            caption="../report/plot_training.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/training.svg",
-        data=f"{RESULTS}/figures/training.csv",
-    log:
-        f"{RESULTS}/logs/plot_training.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_training.tsv"
-    threads: 1
-    resources:
-        mem_mb=800,
-    script:
-        "../scripts/plot_training.py"
-
-
-rule plot_calibration:
-    """Whether bands hold what they promise."""
-    input:
-        metrics=ERRORS["metrics"],
-        summary=ERRORS["summary"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/calibration.png",
-            caption="../report/plot_calibration.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/calibration.svg",
-        data=f"{RESULTS}/figures/calibration.csv",
-    log:
-        f"{RESULTS}/logs/plot_calibration.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_calibration.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_calibration.py"
-
-
-rule plot_regions:
-    """Errors by region of the parameters, and on further sets."""
-    input:
-        metrics=ERRORS["metrics"],
-        regions=ERRORS["regions"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/regions.png",
-            caption="../report/plot_regions.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/regions.svg",
-        data=f"{RESULTS}/figures/regions.csv",
-    log:
-        f"{RESULTS}/logs/plot_regions.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_regions.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_regions.py"
-
-
-rule plot_worst:
-    """The twelve held-out cases whose density is predicted worst."""
-    input:
-        stack=rules.build_stack.output.stack,
-        moulds=rules.sample_design.output.moulds,
-        metrics=ERRORS["metrics"],
-        weights=SURROGATE["weights"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/worst.png",
-            caption="../report/plot_worst.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/worst.svg",
-        data=f"{RESULTS}/figures/worst.nc",
-    log:
-        f"{RESULTS}/logs/plot_worst.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_worst.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_worst.py"
-
-
-rule plot_models:
-    """Every model: training, cost, and errors in multiples of the noise floor."""
-    input:
-        table=rules.compare_models.output.table,
-        histories=expand(rules.assemble_model.output.history, model=MODELS),
-    output:
-        png=report(
-            f"{RESULTS}/figures/models.png",
-            caption="../report/plot_models.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/models.svg",
-        data=f"{RESULTS}/figures/models.csv",
-    log:
-        f"{RESULTS}/logs/plot_models.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_models.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_models.py"
-
-
-rule plot_enrichment:
-    """What further simulations were worth in training: errors by region, before and after."""
-    input:
-        regions=rules.compare_models.output.regions,
-    output:
-        png=report(
-            f"{RESULTS}/figures/enrichment.png",
-            caption="../report/plot_enrichment.rst",
-            category="Surrogate",
-        ),
-        svg=f"{RESULTS}/figures/enrichment.svg",
-        data=f"{RESULTS}/figures/enrichment.csv",
-    log:
-        f"{RESULTS}/logs/plot_enrichment.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_enrichment.tsv"
-    threads: 1
-    resources:
-        mem_mb=800,
+        mem_mb=2500,
     params:
-        models=[CONFIG.surrogate.model, *ENRICHED],
+        kind=lambda wildcards: TABLE_FIGURES[wildcards.figure]["kind"],
+        options=lambda wildcards: TABLE_FIGURES[wildcards.figure].get("options", {}),
     script:
-        "../scripts/plot_enrichment.py"
+        "../scripts/plot_figure.py"
 
 
-rule plot_tradeoff:
-    """Error against cost, by method."""
+use rule plot_tables as plot_fields with:
     input:
-        table=rules.tabulate_tradeoff.output.table,
+        unpack(lambda wildcards: FIELD_FIGURES[wildcards.figure]["inputs"]),
+    output:
+        png=report(f"{FIGURE}.png", category="Figures", labels={"figure": "{figure}"}),
+        svg=f"{FIGURE}.svg",
+        data=f"{FIGURE}.nc",
+    log:
+        f"{RESULTS}/logs/plot_fields/{{figure}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_fields/{{figure}}.tsv"
+    wildcard_constraints:
+        figure="|".join(FIELD_FIGURES) or "none",
+    params:
+        kind=lambda wildcards: FIELD_FIGURES[wildcards.figure]["kind"],
+        options=lambda wildcards: FIELD_FIGURES[wildcards.figure].get("options", {}),
+
+
+rule plot_folding:
+    """Simulate one tissue as it contracts and folded by an anneal, and draw both."""
+    input:
+        mould=[find_mould(CASES[case].mould) for case in FOLDED],
+        kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         png=report(
-            f"{RESULTS}/figures/tradeoff.png",
-            caption="../report/plot_tradeoff.rst",
-            category="Trade-off",
+            f"{RESULTS}/figures/folding.png",
+            category="Figures",
+            labels={"figure": "folding"},
         ),
-        svg=f"{RESULTS}/figures/tradeoff.svg",
-        data=f"{RESULTS}/figures/tradeoff.csv",
+        svg=f"{RESULTS}/figures/folding.svg",
+        data=f"{RESULTS}/figures/folding.csv",
     log:
-        f"{RESULTS}/logs/plot_tradeoff.log",
+        f"{RESULTS}/logs/plot_folding.log",
     benchmark:
-        f"{RESULTS}/benchmarks/plot_tradeoff.tsv"
+        f"{RESULTS}/benchmarks/plot_folding.tsv"
     threads: 1
     resources:
-        mem_mb=800,
+        mem_mb=1000,
+    params:
+        trial=CONFIG.trial(FOLDED[0]) if FOLDED else None,
+        method=CONFIG.tradeoff.annealed[1] if FOLDED else None,
+        model_version=MODEL_VERSION,
     script:
-        "../scripts/plot_tradeoff.py"
+        "../scripts/plot_folding.py"
+
+
+rule studies:
+    """Every campaign over a grid: contraction, simulated and predicted, with its figures."""
+    input:
+        expand(rules.tabulate_campaign.output, campaign=SWEEPS),
+        expand(rules.compare_contraction.output, campaign=SWEEPS),
+        [
+            f"{RESULTS}/figures/{figure}.png"
+            for figure in (*TABLE_FIGURES, *FIELD_FIGURES)
+            if figure.startswith(("contraction_", "panels_", "directors_"))
+        ],
+
+
+rule tradeoff:
+    """Speed against accuracy, measured."""
+    input:
+        (
+            [
+                rules.tabulate_tradeoff.output,
+                f"{RESULTS}/figures/tradeoff.png",
+                rules.plot_folding.output.png if FOLDED else [],
+            ]
+            if CASES
+            else []
+        ),
+
+
+rule fit:
+    """The fitted tissues."""
+    input:
+        rules.tabulate_fits.output if FITTED else [],
+        rules.fit_joint.output if JOINT else [],
+        expand(rules.fit_outline.output, tissue=FITTED),
+        expand(f"{RESULTS}/figures/fit_{{tissue}}.png", tissue=FITTED),
+        expand(f"{RESULTS}/figures/valley_{{tissue}}.png", tissue=FITTED),
 
 
 rule figures:
     """Every figure."""
     input:
-        expand(f"{RESULTS}/figures/{{figure}}.png", figure=FIGURES),
-        expand(rules.plot_fit.output.png, tissue=CONFIG.fit.tissues),
-        expand(rules.plot_valley.output.png, tissue=CONFIG.fit.tissues),
-        rules.sweep.input,
+        expand(f"{FIGURE}.png", figure=[*TABLE_FIGURES, *FIELD_FIGURES]),
+        rules.plot_folding.output.png if FOLDED else [],

@@ -1,12 +1,9 @@
 """Fits of measured tissues."""
 
-# How fits simulate; every simulation that they make hangs on this.
-SIMULATOR = {
-    "model": CONFIG.model.model_dump(mode="json"),
-    "accuracy": CONFIG.simulation.accuracy,
-    "pixels": CONFIG.fields.pixels,
-    "seed": CONFIG.seed,
-}
+# How fits simulate; every simulation that they make depends on this.
+SIMULATOR = {**CONFIG.simulator, "pixels": CONFIG.pixels, "seed": CONFIG.seed}
+FITTED = list(TISSUES)
+JOINT = CONFIG.fit.joint if MODELS else ()
 
 
 rule fit_tissue:
@@ -14,16 +11,11 @@ rule fit_tissue:
     input:
         mould=lambda wildcards: find_mould(TISSUES[wildcards.tissue].mould),
         weights=SURROGATE["weights"],
-        model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
-        fit=report(
-            f"{RESULTS}/fits/{{tissue}}.json",
-            caption="../report/fit.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "fit"},
-        ),
+        fit=f"{RESULTS}/fits/{{tissue}}.json",
         tissue=f"{RESULTS}/fits/{{tissue}}.nc",
+        prediction=f"{RESULTS}/fits/{{tissue}}_prediction.nc",
     log:
         f"{RESULTS}/logs/fit_tissue/{{tissue}}.log",
     benchmark:
@@ -33,12 +25,11 @@ rule fit_tissue:
         mem_mb=2000,
     params:
         tissue=lambda wildcards: TISSUES[wildcards.tissue].model_dump(mode="json"),
-        mould_scale=CONFIG.fit.mould_scale,
-        starts=CONFIG.fit.starts,
-        corrections=CONFIG.fit.corrections,
-        repeats=CONFIG.fit.repeats,
+        mould_scale=CONFIG.mould_scale,
         simulator=SIMULATOR,
-        configuration=CONFIG.model_fingerprint(CONFIG.chosen_model),
+        configuration=(
+            CONFIG.model_fingerprint(CONFIG.surrogate) if CONFIG.surrogate else None
+        ),
     script:
         "../scripts/fit_tissue.py"
 
@@ -50,12 +41,7 @@ rule fit_by_simulator:
         mould=rules.fit_tissue.input.mould,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
-        fit=report(
-            f"{RESULTS}/fits/{{tissue}}_simulator.json",
-            caption="../report/fit_by_simulator.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "fit by the simulator"},
-        ),
+        fit=f"{RESULTS}/fits/{{tissue}}_simulator.json",
         tissue=f"{RESULTS}/fits/{{tissue}}_simulator.nc",
     log:
         f"{RESULTS}/logs/fit_by_simulator/{{tissue}}.log",
@@ -66,9 +52,9 @@ rule fit_by_simulator:
         mem_mb=1500,
     params:
         simulations=CONFIG.fit.simulations,
-        repeats=CONFIG.fit.repeats,
+        mould_scale=CONFIG.mould_scale,
         simulator=SIMULATOR,
-        configuration=CONFIG.model_fingerprint(CONFIG.chosen_model),
+        configuration=rules.fit_tissue.params.configuration,
     script:
         "../scripts/fit_by_simulator.py"
 
@@ -79,20 +65,13 @@ rule infer_parameters:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,
         weights=SURROGATE["weights"],
-        model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
-        posterior=report(
-            f"{RESULTS}/fits/{{tissue}}_posterior.json",
-            caption="../report/infer_parameters.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "posterior"},
-        ),
+        posterior=f"{RESULTS}/fits/{{tissue}}_posterior.json",
         points=f"{RESULTS}/fits/{{tissue}}_points.csv",
         draws=f"{RESULTS}/fits/{{tissue}}_draws.csv",
         further=report(
             f"{RESULTS}/fits/{{tissue}}_further.csv",
-            caption="../report/further.rst",
             category="Fits",
             labels={"tissue": "{tissue}", "what": "further measurements"},
         ),
@@ -104,9 +83,7 @@ rule infer_parameters:
     resources:
         mem_mb=2500,
     params:
-        points=CONFIG.fit.points,
-        error=CONFIG.fit.error,
-        draws=CONFIG.fit.draws,
+        mould_scale=CONFIG.mould_scale,
         simulator=SIMULATOR,
     script:
         "../scripts/infer_parameters.py"
@@ -115,17 +92,16 @@ rule infer_parameters:
 rule fit_joint:
     """Fit several tissues with common parameters, by the surrogate and by the simulator."""
     input:
-        fits=expand(rules.fit_tissue.output.fit, tissue=CONFIG.fit.joint),
-        moulds=[find_mould(TISSUES[tissue].mould) for tissue in CONFIG.fit.joint],
+        fits=expand(rules.fit_tissue.output.fit, tissue=JOINT),
+        moulds=[find_mould(TISSUES[tissue].mould) for tissue in JOINT],
         weights=SURROGATE["weights"],
-        model=SURROGATE["model"],
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         fit=f"{RESULTS}/fits/joint.json",
         table=report(
             f"{RESULTS}/fits/joint.csv",
-            caption="../report/fit_joint.rst",
             category="Fits",
+            labels={"tissue": "all", "what": "joint fit"},
         ),
     log:
         f"{RESULTS}/logs/fit_joint.log",
@@ -135,8 +111,7 @@ rule fit_joint:
     resources:
         mem_mb=2000,
     params:
-        mould_scale=CONFIG.fit.mould_scale,
-        starts=CONFIG.fit.starts,
+        mould_scale=CONFIG.mould_scale,
         simulations=CONFIG.fit.simulations,
         simulator=SIMULATOR,
     script:
@@ -146,18 +121,11 @@ rule fit_joint:
 rule fit_outline:
     """Fit a simulated tissue, whose parameters are known, by its ratios and by its whole outline."""
     input:
-        fit=rules.fit_tissue.output.fit,
         tissue=rules.fit_tissue.output.tissue,
         mould=rules.fit_tissue.input.mould,
         weights=SURROGATE["weights"],
-        model=SURROGATE["model"],
     output:
-        fit=report(
-            f"{RESULTS}/fits/{{tissue}}_outline.json",
-            caption="../report/fit_outline.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "outline"},
-        ),
+        fit=f"{RESULTS}/fits/{{tissue}}_outline.json",
     log:
         f"{RESULTS}/logs/fit_outline/{{tissue}}.log",
     benchmark:
@@ -166,53 +134,26 @@ rule fit_outline:
     resources:
         mem_mb=2000,
     params:
-        starts=CONFIG.fit.starts,
+        mould_scale=CONFIG.mould_scale,
         seed=CONFIG.seed,
     script:
         "../scripts/fit_outline.py"
 
 
-rule simulate_unmeasured:
-    """Simulate a tissue of which only delta is known, over the range of spring constants."""
-    input:
-        mould=lambda wildcards: find_mould(UNMEASURED[wildcards.unmeasured].mould),
-        kernels=ancient(rules.compile_kernels.output.kernels),
-    output:
-        table=report(
-            f"{RESULTS}/fits/{{unmeasured}}_bound.csv",
-            caption="../report/simulate_unmeasured.rst",
-            category="Fits",
-            labels={"tissue": "{unmeasured}", "what": "at its bound"},
-        ),
-    log:
-        f"{RESULTS}/logs/simulate_unmeasured/{{unmeasured}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/simulate_unmeasured/{{unmeasured}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    params:
-        delta=lambda wildcards: UNMEASURED[wildcards.unmeasured].paper["delta"],
-        mould_scale=CONFIG.fit.mould_scale,
-        simulator=SIMULATOR,
-    script:
-        "../scripts/simulate_unmeasured.py"
-
-
 # Fits by the simulator, where it may make simulations.
-BY_SIMULATOR = CONFIG.fit.tissues if CONFIG.fit.simulations else ()
+BY_SIMULATOR = FITTED if CONFIG.fit.simulations else []
 
 
 rule tabulate_fits:
     """All fits beside the paper's, as one table."""
     input:
-        fits=expand(rules.fit_tissue.output.fit, tissue=CONFIG.fit.tissues),
+        fits=expand(rules.fit_tissue.output.fit, tissue=FITTED),
         simulators=expand(rules.fit_by_simulator.output.fit, tissue=BY_SIMULATOR),
     output:
         table=report(
             f"{RESULTS}/fits/fits.csv",
-            caption="../report/fits.rst",
             category="Fits",
+            labels={"tissue": "all", "what": "fits"},
         ),
     log:
         f"{RESULTS}/logs/tabulate_fits.log",
@@ -223,74 +164,3 @@ rule tabulate_fits:
         mem_mb=500,
     script:
         "../scripts/tabulate_fits.py"
-
-
-rule plot_fit:
-    """Draw a fitted tissue, predicted and simulated, with its measures beside the target's."""
-    input:
-        fit=rules.fit_tissue.output.fit,
-        tissue=rules.fit_tissue.output.tissue,
-        simulator=lambda wildcards: (
-            expand(rules.fit_by_simulator.output, tissue=wildcards.tissue)
-            if BY_SIMULATOR
-            else []
-        ),
-        mould=rules.fit_tissue.input.mould,
-        weights=SURROGATE["weights"],
-    output:
-        png=report(
-            f"{RESULTS}/figures/fit_{{tissue}}.png",
-            caption="../report/plot_fit.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "figure"},
-        ),
-        svg=f"{RESULTS}/figures/fit_{{tissue}}.svg",
-        data=f"{RESULTS}/figures/fit_{{tissue}}.nc",
-    log:
-        f"{RESULTS}/logs/plot_fit/{{tissue}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_fit/{{tissue}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
-    script:
-        "../scripts/plot_fit.py"
-
-
-rule plot_valley:
-    """Draw what two ratios leave open of three parameters, and what would narrow it."""
-    input:
-        fit=rules.fit_tissue.output.fit,
-        posterior=rules.infer_parameters.output.posterior,
-        points=rules.infer_parameters.output.points,
-        draws=rules.infer_parameters.output.draws,
-        further=rules.infer_parameters.output.further,
-    output:
-        png=report(
-            f"{RESULTS}/figures/valley_{{tissue}}.png",
-            caption="../report/plot_valley.rst",
-            category="Fits",
-            labels={"tissue": "{tissue}", "what": "valley"},
-        ),
-        svg=f"{RESULTS}/figures/valley_{{tissue}}.svg",
-        data=f"{RESULTS}/figures/valley_{{tissue}}.csv",
-    log:
-        f"{RESULTS}/logs/plot_valley/{{tissue}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_valley/{{tissue}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    script:
-        "../scripts/plot_valley.py"
-
-
-rule fit:
-    """The fitted tissues."""
-    input:
-        rules.tabulate_fits.output,
-        rules.fit_joint.output if CONFIG.fit.joint else [],
-        expand(rules.fit_outline.output, tissue=CONFIG.fit.tissues),
-        expand(rules.simulate_unmeasured.output, unmeasured=CONFIG.fit.unmeasured),
-        expand(rules.plot_fit.output.png, tissue=CONFIG.fit.tissues),
-        expand(rules.plot_valley.output.png, tissue=CONFIG.fit.tissues),

@@ -19,12 +19,12 @@ rule write_report:
     """The report that is read from the top, with every figure and number inside."""
     input:
         rules.record_configuration.output,
-        rules.dataset.input,
+        rules.campaigns.input,
         rules.train.input,
         rules.evaluate.input,
-        rules.fit.input,
-        rules.sweep.input,
+        rules.studies.input,
         rules.tradeoff.input,
+        rules.fit.input,
         rules.figures.input,
         template=f"{workflow.basedir}/workflow/report/report.html.jinja",
     output:

@@ -1,23 +1,54 @@
-"""Training of the surrogate, and of what it is compared with."""
+"""Surrogates: training, and how good every model is on held-out simulations."""
+
+# The campaign by which fields are scaled and models are validated and tested, and those that only test.
+TRAINING = [CONFIG.training_campaign] if MODELS else []
+EVALUATED = [
+    name
+    for name, campaign in CAMPAIGNS.items()
+    if name not in TRAINING and campaign.kind and campaign.tests and not campaign.grid
+]
+REPEATS = [
+    name for name, campaign in CAMPAIGNS.items() if campaign.repeat_of == TRAINING
+]
+
+
+rule fit_scaling:
+    """Scale fields to [-1, 1] by the training split alone."""
+    input:
+        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
+    output:
+        normalisation=f"{RESULTS}/surrogate/normalisation.json",
+    log:
+        f"{RESULTS}/logs/fit_scaling.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/fit_scaling.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/fit_scaling.py"
 
 
 rule train_member:
     """Train one network of a model; goes on from its checkpoint after an interruption."""
     input:
-        stack=rules.build_stack.output.stack,
-        extra=lambda wildcards: (
-            f"{RESULTS}/further/{MODELS[wildcards.model].extra}/fields.nc"
-            if MODELS[wildcards.model].extra
-            else []
+        stacks=lambda wildcards: expand(
+            rules.build_stack.output.stack, campaign=MODELS[wildcards.model].campaigns
         ),
-        begun=lambda wildcards: (
-            f"{RESULTS}/surrogate/{MODELS[wildcards.model].initial_weights}/members/{wildcards.member}/weights.safetensors"
-            if MODELS[wildcards.model].initial_weights
-            else []
+        examples=lambda wildcards: expand(
+            rules.list_examples.output.examples,
+            campaign=MODELS[wildcards.model].campaigns,
         ),
-        examples=rules.augment_dataset.output.examples,
-        normalisation=rules.augment_dataset.output.normalisation,
-        checked=rules.check_dataset.output.checked,
+        checked=lambda wildcards: expand(
+            rules.check_campaign.output.checked,
+            campaign=MODELS[wildcards.model].campaigns,
+        ),
+        initial=lambda wildcards: expand(
+            f"{RESULTS}/surrogate/{{model}}/members/{{member}}/weights.safetensors",
+            model=MODELS[wildcards.model].initial_weights or [],
+            member=wildcards.member,
+        ),
+        normalisation=rules.fit_scaling.output.normalisation,
     output:
         weights=f"{RESULTS}/surrogate/{{model}}/members/{{member}}/weights.safetensors",
         model=f"{RESULTS}/surrogate/{{model}}/members/{{member}}/model.json",
@@ -26,6 +57,8 @@ rule train_member:
         f"{RESULTS}/logs/train_member/{{model}}/{{member}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/train_member/{{model}}/{{member}}.tsv"
+    wildcard_constraints:
+        model="|".join(MODELS) or "none",
     retries: 1
     threads: lambda wildcards: MODELS[wildcards.model].threads
     resources:
@@ -33,26 +66,21 @@ rule train_member:
         runtime=lambda wildcards, attempt: 720 * attempt,
     params:
         identity=lambda wildcards: CONFIG.model_fingerprint(wildcards.model),
-        surrogate=lambda wildcards: MODELS[wildcards.model].model_dump(mode="json"),
+        model=lambda wildcards: MODELS[wildcards.model].model_dump(mode="json"),
         seed=lambda wildcards: CONFIG.seed + int(wildcards.member),
-        layers=CONFIG.model.layers,
+        layers=CONFIG.layers,
         checkpoint=lambda wildcards, output: f"{Path(output.weights).parent}/checkpoint.pt",
     script:
         "../scripts/train_member.py"
 
 
 rule assemble_model:
-    """Put the members of a model together, and calibrate their spread on the validation split."""
+    """Put the networks of a model together, and calibrate their spread on the validation split."""
     input:
-        stack=rules.build_stack.output.stack,
-        moulds=rules.sample_design.output.moulds,
+        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
+        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
         weights=lambda wildcards: expand(
             rules.train_member.output.weights,
-            member=range(MODELS[wildcards.model].ensemble_size),
-            allow_missing=True,
-        ),
-        models=lambda wildcards: expand(
-            rules.train_member.output.model,
             member=range(MODELS[wildcards.model].ensemble_size),
             allow_missing=True,
         ),
@@ -66,7 +94,6 @@ rule assemble_model:
         model=f"{RESULTS}/surrogate/{{model}}/model.json",
         history=report(
             f"{RESULTS}/surrogate/{{model}}/training.csv",
-            caption="../report/training_table.rst",
             category="Surrogate",
             labels={"model": "{model}", "what": "training"},
         ),
@@ -74,6 +101,8 @@ rule assemble_model:
         f"{RESULTS}/logs/assemble_model/{{model}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/assemble_model/{{model}}.tsv"
+    wildcard_constraints:
+        model="|".join(MODELS) or "none",
     threads: 1
     resources:
         mem_mb=2500,
@@ -83,17 +112,182 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The model that further simulations are chosen by, and the one that tissues are fitted and drawn by.
-FIRST, SURROGATE = (
-    {
-        name: expand(rules.assemble_model.output[name], model=model)[0]
-        for name in ("weights", "model", "history")
-    }
-    for model in (CONFIG.surrogate.model, CONFIG.chosen_model)
-)
+# The surrogate: the model by which tissues are fitted and drawn.
+SURROGATE = {
+    name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate or [])
+    for name in ("weights", "model", "history")
+}
 
 
 rule train:
     """Every model, trained."""
     input:
         expand(rules.assemble_model.output, model=MODELS),
+
+
+rule measure_floor:
+    """Measure how far simulations of other seeds differ: what no prediction can beat."""
+    input:
+        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
+        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
+        repeats=expand(rules.build_stack.output.stack, campaign=REPEATS),
+    output:
+        floor=report(f"{RESULTS}/evaluation/floor.csv", category="Surrogate"),
+    log:
+        f"{RESULTS}/logs/measure_floor.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/measure_floor.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        layers=CONFIG.layers,
+    script:
+        "../scripts/measure_floor.py"
+
+
+rule evaluate_model:
+    """Errors of a model, or of a guess without a network, on the test runs of a campaign."""
+    input:
+        stack=rules.build_stack.output.stack,
+        moulds=rules.design_campaign.output.moulds,
+        # A baseline answers from the training split itself.
+        training=expand(rules.build_stack.output.stack, campaign=TRAINING),
+        examples=expand(rules.list_examples.output.examples, campaign=TRAINING),
+        weights=lambda wildcards: (
+            rules.assemble_model.output.weights if wildcards.model in MODELS else []
+        ),
+    output:
+        metrics=f"{RESULTS}/evaluation/{{model}}/campaigns/{{campaign}}.csv",
+    log:
+        f"{RESULTS}/logs/evaluate_model/{{model}}/{{campaign}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/evaluate_model/{{model}}/{{campaign}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2500,
+    params:
+        layers=CONFIG.layers,
+    script:
+        "../scripts/evaluate_model.py"
+
+
+rule summarise_evaluation:
+    """Errors of a model on the test split, by region, on other campaigns, and in multiples of the floor."""
+    input:
+        metrics=lambda wildcards: expand(
+            rules.evaluate_model.output.metrics,
+            campaign=[*TRAINING, *(EVALUATED if wildcards.model in MODELS else [])],
+            allow_missing=True,
+        ),
+        floor=rules.measure_floor.output.floor,
+    output:
+        metrics=f"{RESULTS}/evaluation/{{model}}/metrics.csv",
+        summary=f"{RESULTS}/evaluation/{{model}}/metrics.json",
+        regions=report(
+            f"{RESULTS}/evaluation/{{model}}/regions.csv",
+            category="Surrogate",
+            labels={"model": "{model}", "what": "errors by region"},
+        ),
+    log:
+        f"{RESULTS}/logs/summarise_evaluation/{{model}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/summarise_evaluation/{{model}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=800,
+    script:
+        "../scripts/summarise_evaluation.py"
+
+
+ERRORS = {
+    name: expand(rules.summarise_evaluation.output[name], model=CONFIG.surrogate or [])
+    for name in ("metrics", "summary", "regions")
+}
+
+
+rule compare_models:
+    """Every model in one table: what it costs, and its errors in multiples of the noise floor."""
+    input:
+        summaries=expand(
+            rules.summarise_evaluation.output.summary, model=[*MODELS, *BASELINES]
+        ),
+        regions=expand(rules.summarise_evaluation.output.regions, model=MODELS),
+        weights=expand(rules.assemble_model.output.weights, model=MODELS),
+        histories=expand(rules.assemble_model.output.history, model=MODELS),
+    output:
+        table=report(f"{RESULTS}/evaluation/models.csv", category="Surrogate"),
+        regions=report(
+            f"{RESULTS}/evaluation/models_by_region.csv", category="Surrogate"
+        ),
+    log:
+        f"{RESULTS}/logs/compare_models.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/compare_models.tsv"
+    threads: 2
+    resources:
+        mem_mb=2500,
+    params:
+        campaign=CONFIG.training_campaign,
+    script:
+        "../scripts/compare_models.py"
+
+
+rule predict_samples:
+    """Predict the held-out samples that figures show: the one with the median error, and the worst."""
+    input:
+        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
+        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
+        metrics=ERRORS["metrics"],
+        weights=SURROGATE["weights"],
+    output:
+        samples=f"{RESULTS}/evaluation/samples.nc",
+    log:
+        f"{RESULTS}/logs/predict_samples.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/predict_samples.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    script:
+        "../scripts/predict_samples.py"
+
+
+rule ship_model:
+    """The surrogate as the package ships it: weights in half precision, and a model card."""
+    input:
+        **SURROGATE,
+        summary=ERRORS["summary"],
+        regions=ERRORS["regions"],
+    output:
+        weights=f"{RESULTS}/shipped/weights.safetensors",
+        model=f"{RESULTS}/shipped/model.json",
+        card=report(f"{RESULTS}/shipped/card.md", category="Surrogate"),
+    log:
+        f"{RESULTS}/logs/ship_model.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/ship_model.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        name=CONFIG.name,
+        model=CONFIG.surrogate,
+        campaign=CONFIG.training_campaign,
+    script:
+        "../scripts/ship_model.py"
+
+
+rule evaluate:
+    """The errors of every model."""
+    input:
+        (
+            [
+                rules.compare_models.output,
+                rules.measure_floor.output,
+                rules.ship_model.output.card,
+                *ERRORS.values(),
+            ]
+            if MODELS
+            else []
+        ),

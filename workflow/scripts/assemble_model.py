@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from raptor.config import content_hash
+from raptor.core.blocks import content_hash
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
 from raptor.dataset.stack import read_table
@@ -19,11 +19,14 @@ with logged(snakemake.log[0]):
     folders = [Path(weights).parent for weights in snakemake.input.weights]
     trained = [load(folder) for folder in folders]
     surrogate = replace(trained[0], members=tuple(each.members[0] for each in trained))
-    stack = Path(snakemake.input.stack)
-    moulds = moulds_by_id(Path(snakemake.input.moulds))
+    (stack,), (moulds,) = (map(Path, snakemake.input[name]) for name in ("stack", "moulds"))
     with progress("calibration", len(read_table(stack).rows("validation"))) as advance:
         found = calibrate(
-            surrogate, stack, moulds, snakemake.params.seed, lambda s: advance(f"simulation {s}")
+            surrogate,
+            stack,
+            moulds_by_id(moulds),
+            snakemake.params.seed,
+            lambda s: advance(f"simulation {s}"),
         )
     described = [read_description(folder) for folder in folders]
     save(

@@ -19,6 +19,6 @@ with logged(snakemake.log[0]):
             snakemake.params.pixels,
             simulation_configuration=snakemake.params.simulation_configuration,
             configuration=snakemake.params.configuration,
-            device=chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0)),
+            device=chosen_device("auto", snakemake.resources.get("gpu", 0)),
             on_progress=lambda row: advance(f"sample {row}"),
         )

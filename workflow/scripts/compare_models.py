@@ -15,7 +15,7 @@ from raptor.surrogate.files import load, read_description
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     summaries = {
-        Path(summary).parent.name: json.loads(Path(summary).read_text())["test"]
+        Path(summary).parent.name: json.loads(Path(summary).read_text())[snakemake.params.campaign]
         for summary in snakemake.input.summaries
     }
     costs: dict[str, dict] = {name: {"model": name} for name in summaries}

@@ -1,27 +1,30 @@
-"""Evaluate a model on a set."""
+"""Evaluate a model, or a guess without a network, on the test runs of a campaign."""
 
 from pathlib import Path
 
-import torch
-
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
+from raptor.dataset.examples import read_examples
 from raptor.dataset.stack import read_table
 from raptor.moulds import moulds_by_id
 from raptor.studies.evaluation import evaluate, predictor_of
-from raptor.surrogate.files import load
+from raptor.surrogate.baselines import baseline
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
-    stack = Path(snakemake.input.stack)
-    surrogate = load(Path(snakemake.input.weights).parent)
+    if snakemake.input.weights:
+        import torch  # guesses need not wait for it
+
+        from raptor.surrogate.files import load
+
+        torch.set_num_threads(snakemake.threads)
+        answer = predictor_of(load(Path(snakemake.input.weights).parent))
+    else:
+        (training,), (examples,) = snakemake.input.training, snakemake.input.examples
+        answer = baseline(snakemake.wildcards.model, Path(training), read_examples(Path(examples)))
+    stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))
     with progress("evaluation", len(read_table(stack).rows("test"))) as advance:
         metrics = evaluate(
-            predictor_of(surrogate),
-            stack,
-            moulds_by_id(Path(snakemake.input.moulds)),
-            surrogate.layers,
-            lambda simulation: advance(f"simulation {simulation}"),
+            answer, stack, moulds, snakemake.params.layers, lambda s: advance(f"simulation {s}")
         )
     with atomic_path(Path(snakemake.output.metrics)) as path:
         metrics.to_csv(path, index=False)

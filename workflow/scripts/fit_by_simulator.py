@@ -9,20 +9,21 @@ from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
 from raptor.fitting import Fit, Simulator, Target, descend_by_simulation, measure_again, unit_of, write_fit
-from raptor.moulds import read_mould
+from raptor.fitting.simulator import REPEATS
+from raptor.moulds.reading import read_at_scale
 from raptor.parameters import CellParameters
 
 with logged(snakemake.log[0]):
     params = snakemake.params
     before = json.loads(Path(snakemake.input.fit).read_text())
     simulator, target = Simulator.configured(params.simulator), Target(**before["target"])
-    mould = read_mould(Path(snakemake.input.mould)).scaled(before["mould_scale"])
+    mould = read_at_scale(snakemake.input.mould, params.mould_scale)
     start = unit_of(CellParameters(**before["corrected"]["parameters"]))
     measure, begun = simulator.measure(mould), perf_counter()
     fitted = Fit.at(descend_by_simulation(measure, target.residuals, start, params.simulations))
     seconds = perf_counter() - begun
-    runs = [simulator.run(mould, fitted.parameters, further) for further in range(1, params.repeats + 1)]
-    first = Run(0, mould.name, "test", False, fitted.parameters, simulator.seed_of(1))
+    runs = [simulator.run(mould, fitted.parameters, further) for further in range(1, REPEATS + 1)]
+    first = Run(0, mould.name, "test", fitted.parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)
     write_shard(path, [first], {0: runs[0]}, simulator.model, simulator.accuracy, params.configuration)
     again = measure_again(runs, simulator, mould, target)

@@ -8,7 +8,7 @@ import torch
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged
 from raptor.fitting import Simulator, Target, fit_joint, surrogate_measure, tabulate_joint, write_fit
-from raptor.moulds import read_mould
+from raptor.moulds.reading import read_at_scale
 from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]):
@@ -16,12 +16,12 @@ with logged(snakemake.log[0]):
     params, simulator = snakemake.params, Simulator.configured(snakemake.params.simulator)
     fits = [json.loads(Path(path).read_text()) for path in snakemake.input.fits]
     targets = {fit["tissue"]: Target(**fit["target"]) for fit in fits}
-    moulds = [read_mould(Path(path)).scaled(params.mould_scale) for path in snakemake.input.moulds]
-    surrogate = load(Path(snakemake.input.weights).parent)
+    moulds = [read_at_scale(path, params.mould_scale) for path in snakemake.input.moulds]
+    surrogate = load(Path(snakemake.input.weights[0]).parent)
     predicted = [surrogate_measure(surrogate, mould) for mould in moulds]
     refined = [surrogate_measure(surrogate, mould, averaged=True) for mould in moulds]
     simulated = [simulator.measure(mould) for mould in moulds]
-    searches = {"starts": params.starts, "seed": simulator.seed, "budget": params.simulations}
+    searches = {"seed": simulator.seed, "budget": params.simulations}
     content = fit_joint(targets, predicted, refined, simulated, **searches)
     write_fit(Path(snakemake.output.fit), content)
     with atomic_path(Path(snakemake.output.table)) as path:

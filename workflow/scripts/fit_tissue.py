@@ -6,9 +6,10 @@ import torch
 
 from raptor.core.jobs import logged
 from raptor.dataset.design import Run
+from raptor.dataset.result import save
 from raptor.dataset.shards import write_shard
 from raptor.fitting import Simulator, Target, fit_tissue, write_fit
-from raptor.moulds import read_mould
+from raptor.moulds.reading import read_at_scale
 from raptor.parameters import CellParameters
 from raptor.surrogate.files import load
 
@@ -16,15 +17,15 @@ with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     params, tissue = snakemake.params, snakemake.params.tissue
     simulator = Simulator.configured(params.simulator)
-    mould = read_mould(Path(snakemake.input.mould)).scaled(params.mould_scale)
-    target = Target(tissue["area_ratio"], tissue["width_ratio"])
-    limits = {"starts": params.starts, "corrections": params.corrections, "repeats": params.repeats}
-    surrogate = load(Path(snakemake.input.weights).parent)
-    found, simulation = fit_tissue(surrogate, simulator, mould, target, **limits)
+    surrogate = load(Path(snakemake.input.weights[0]).parent)
+    mould = read_at_scale(snakemake.input.mould, params.mould_scale)
+    found, simulation = fit_tissue(
+        surrogate, simulator, mould, Target(tissue["area_ratio"], tissue["width_ratio"])
+    )
     parameters = CellParameters(**found["surrogate"]["parameters"])
-    first = Run(0, mould.name, "test", False, parameters, simulator.seed_of(1))
+    first = Run(0, mould.name, "test", parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)
     write_shard(path, [first], {0: simulation}, simulator.model, simulator.accuracy, params.configuration)
+    save(surrogate.examine(mould, parameters), snakemake.output.prediction)
     about = {name: tissue[name] for name in ("description", "paper")}
-    content = {"tissue": snakemake.wildcards.tissue, "mould_scale": params.mould_scale, **about, **found}
-    write_fit(Path(snakemake.output.fit), content)
+    write_fit(Path(snakemake.output.fit), {"tissue": snakemake.wildcards.tissue, **about, **found})

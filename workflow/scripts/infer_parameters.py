@@ -10,18 +10,18 @@ import torch
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
 from raptor.fitting import PARAMETERS, Simulator, Target, infer, simulate_draws, summarise, survey, write_fit
-from raptor.fitting.experimental_design import rank_measurements
-from raptor.moulds import read_mould
+from raptor.fitting.experimental_design import DRAWS, rank_measurements
+from raptor.moulds.reading import read_at_scale
 from raptor.surrogate.files import load
 
-with logged(snakemake.log[0]), progress("draws", snakemake.params.draws) as advance:
+with logged(snakemake.log[0]), progress("draws", DRAWS) as advance:
     torch.set_num_threads(snakemake.threads)
     params, fit = snakemake.params, json.loads(Path(snakemake.input.fit).read_text())
     simulator, target = Simulator.configured(params.simulator), Target(**fit["target"])
-    mould = read_mould(Path(snakemake.input.mould)).scaled(fit["mould_scale"])
-    found = survey(load(Path(snakemake.input.weights).parent), mould, params.points, simulator.seed)
-    posterior = infer(found, target, params.error, simulator.seed)
-    sampled = simulate_draws(posterior, simulator, mould, params.draws, advance)
+    mould = read_at_scale(snakemake.input.mould, params.mould_scale)
+    found = survey(load(Path(snakemake.input.weights[0]).parent), mould, simulator.seed)
+    posterior = infer(found, target, simulator.seed)
+    sampled = simulate_draws(posterior, simulator, mould, on_progress=advance)
     drawn = posterior.draws(1000, simulator.seed)
     columns = np.column_stack([posterior.parameters[drawn], posterior.values[drawn]])
     points = pd.DataFrame(columns, columns=[*PARAMETERS, *posterior.names])

@@ -10,10 +10,10 @@ from raptor.moulds import moulds_by_id
 from raptor.studies.evaluation import noise_floor
 
 with logged(snakemake.log[0]):
-    stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))
+    (stack,), (moulds,) = (map(Path, snakemake.input[name]) for name in ("stack", "moulds"))
     tables = [
-        noise_floor(stack, Path(further), moulds, snakemake.params.layers)
-        for further in snakemake.input.further
+        noise_floor(stack, Path(repeats), moulds_by_id(moulds), snakemake.params.layers)
+        for repeats in snakemake.input.repeats
     ]
     floor = pd.concat(tables) if tables else pd.DataFrame(columns=["simulation", "mould"])
     with atomic_path(Path(snakemake.output.floor)) as path:

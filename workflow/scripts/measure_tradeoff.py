@@ -2,29 +2,23 @@
 
 from pathlib import Path
 
-import torch
-
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
 from raptor.moulds import read_mould
-from raptor.studies.tradeoff import Case, Comparison, compare
-from raptor.surrogate.files import load
+from raptor.studies.tradeoff import REFERENCES, Trial, compare
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
-    params = snakemake.params.comparison
-    chosen = params["comparison"]
-    case = Case.of(params, read_mould(Path(snakemake.input.mould)))
-    comparison = Comparison(
-        methods=tuple(chosen["methods"]),
-        layers=tuple(chosen["layers"]),
-        shells=tuple(tuple(shells) for shells in chosen["shells"]),
-        pixels=tuple(chosen["pixels"]),
-        seeds=chosen["seeds"],
-    )
-    trained = snakemake.input.surrogate
-    surrogate = load(Path(trained[0]).parent) if trained else None
-    with progress(case.name, comparison.runs) as advance:
-        table = compare(case, comparison, surrogate, advance)
+    surrogate = None
+    if snakemake.input.surrogate:
+        import torch  # a comparison of simulations need not wait for it
+
+        from raptor.surrogate.files import load
+
+        torch.set_num_threads(snakemake.threads)
+        surrogate = load(Path(snakemake.input.surrogate[0]).parent)
+    trial = Trial.of(snakemake.params.trial, read_mould(Path(snakemake.input.mould)))
+    methods = snakemake.params.methods
+    with progress(trial.name, REFERENCES + len(methods)) as advance:
+        table = compare(trial, methods, surrogate, advance)
     with atomic_path(Path(snakemake.output.table)) as path:
         table.to_csv(path, index=False)

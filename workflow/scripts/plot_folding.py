@@ -10,21 +10,21 @@ from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
 from raptor.moulds import read_mould
 from raptor.plotting import folding_figure, save
-from raptor.studies.tradeoff import Case
+from raptor.studies.tradeoff import Trial
 
 with logged(snakemake.log[0]):
-    case = Case.of(snakemake.params.comparison, read_mould(Path(snakemake.input.mould)))
-    lattice = build_lattice(case.mould, case.parameters, case.model)
+    trial = Trial.of(snakemake.params.trial, read_mould(Path(snakemake.input.mould[0])))
+    lattice = build_lattice(trial.mould, trial.parameters, trial.model)
     methods = ("reference", snakemake.params.method)
     with progress("folding", len(methods)) as advance:
         tissues = {}
         for method in methods:
-            tissues[method] = case.simulate(method)
+            tissues[method] = trial.simulate(method)
             advance(method)
     shares = {name: inverted_share(s.positions, lattice) for name, s in tissues.items()}
-    save(folding_figure(tissues, shares, case.mould), Path(snakemake.output.png).with_suffix(""))
+    save(folding_figure(tissues, shares, trial.mould), Path(snakemake.output.png).with_suffix(""))
     parts = [
-        pd.DataFrame(s.positions, columns=["x", "y", "z"]).assign(method=name, reversed=shares[name])
+        pd.DataFrame(s.positions, columns=["x", "y", "z"]).assign(method=name, inverted=shares[name])
         for name, s in tissues.items()
     ]
     with atomic_path(Path(snakemake.output.data)) as path:

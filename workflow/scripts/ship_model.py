@@ -11,7 +11,7 @@ from raptor.report.model_card import model_card
 from raptor.surrogate.files import load, read_description, save
 
 with logged(snakemake.log[0]):
-    source, target = Path(snakemake.input.weights).parent, Path(snakemake.output.weights).parent
+    source, target = Path(snakemake.input.weights[0]).parent, Path(snakemake.output.weights).parent
     surrogate, description = load(source), read_description(source)
     save(
         target,
@@ -25,9 +25,9 @@ with logged(snakemake.log[0]):
         snakemake.params.name,
         surrogate,
         description["training"],
-        pd.read_csv(snakemake.input.history),
-        json.loads(Path(snakemake.input.summary).read_text())["test"],
-        pd.read_csv(snakemake.input.regions),
+        pd.read_csv(snakemake.input.history[0]),
+        json.loads(Path(snakemake.input.summary[0]).read_text())[snakemake.params.campaign],
+        pd.read_csv(snakemake.input.regions[0]),
         half=True,
     )
     with atomic_path(Path(snakemake.output.card)) as path:

@@ -15,14 +15,17 @@ with logged(snakemake.log[0]):
     runs = [run for run in read_design(Path(snakemake.input.design)) if first <= run.simulation <= last]
     moulds = moulds_by_id(Path(snakemake.input.moulds), {run.mould for run in runs})
     params = snakemake.params
-    model = NetworkModel(params.layers, tuple(params.shells), params.tension)
-    device = chosen_device(snakemake.config["device"], snakemake.resources.get("gpu", 0))
-    with progress(f"simulations {snakemake.wildcards.shard}", len(runs)) as advance:
+    model = NetworkModel(
+        params.simulator["layers"], tuple(params.simulator["shells"]), params.simulator["tension"]
+    )
+    accuracy = params.simulator["accuracy"]
+    device = chosen_device("auto", snakemake.resources.get("gpu", 0))
+    with progress(f"{snakemake.wildcards.campaign} {snakemake.wildcards.shard}", len(runs)) as advance:
         simulations, failures = simulate_shard(
             runs,
             moulds,
             model,
-            params.accuracy,
+            accuracy,
             device,
             lambda run, outcome: advance(f"{run.simulation}: {outcome}"),
         )
@@ -31,7 +34,7 @@ with logged(snakemake.log[0]):
         runs,
         simulations,
         model,
-        params.accuracy,
+        accuracy,
         params.configuration,
         failures,
         device,

@@ -1,4 +1,4 @@
-"""Gather a model's errors: test split, regions of the parameters, further sets."""
+"""Gather a model's errors: test split, regions of the parameters, other campaigns."""
 
 import json
 from pathlib import Path
@@ -12,10 +12,10 @@ from raptor.studies.evaluation import regions_of, summarise
 with logged(snakemake.log[0]):
     floor = pd.read_csv(snakemake.input.floor)
     tables = {Path(path).stem: pd.read_csv(path) for path in snakemake.input.metrics}
-    test = tables["test"]
-    summary = {name: summarise(table, floor if name == "test" else None) for name, table in tables.items()}
+    first = next(iter(tables))
+    summary = {name: summarise(table, floor if name == first else None) for name, table in tables.items()}
     with atomic_path(Path(snakemake.output.metrics)) as path:
-        test.to_csv(path, index=False)
+        tables[first].to_csv(path, index=False)
     with atomic_path(Path(snakemake.output.summary)) as path:
         path.write_text(json.dumps(summary, indent=1) + "\n")
     with atomic_path(Path(snakemake.output.regions)) as path:

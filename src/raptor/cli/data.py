@@ -25,13 +25,13 @@ def progress(
 
 
 def well(
-    stack: Annotated[Path, typer.Argument(help="dataset/fields.nc of a results folder")],
+    stack: Annotated[Path, typer.Argument(help="fields.nc of a campaign")],
     folder: Annotated[Path, typer.Argument(help="where data/train, data/valid and data/test are put")],
 ) -> None:
     """Write a field stack in the HDF5 layout of The Well, one file a split.
 
     Example:
-      raptor well results/paper/dataset/fields.nc results/paper/well
+      raptor well results/paper/campaigns/paper/fields.nc results/paper/well
     """
     from raptor.dataset.well import write_well
 
@@ -40,7 +40,7 @@ def well(
 
 
 def check(
-    path: Annotated[Path, typer.Argument(help="results folder, shard, field stack or mould")],
+    path: Annotated[Path, typer.Argument(help="results folder, campaign, shard, field stack or mould")],
     scale: opt.Scale = None,
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
@@ -68,14 +68,14 @@ def check(
 
 
 def trace(
-    folder: Annotated[Path, typer.Argument(help="results folder")],
+    folder: Annotated[Path, typer.Argument(help="folder of a campaign")],
     simulation: Annotated[int | None, typer.Option(help="simulation id")] = None,
-    example: Annotated[int | None, typer.Option(help="row of dataset/examples.csv, from 0")] = None,
+    example: Annotated[int | None, typer.Option(help="row of examples.csv, from 0")] = None,
 ) -> None:
     """Tell where a sample comes from: mould, parameters, seed, solver, package and model version.
 
     Example:
-      raptor trace results/laptop --simulation 7
+      raptor trace results/laptop/campaigns/paper --simulation 7
     """
     from raptor.dataset.provenance import trace_example, trace_simulation
 
@@ -90,19 +90,16 @@ def trace(
 
 
 def same(
-    first: Annotated[Path, typer.Argument(help="results folder")],
+    first: Annotated[Path, typer.Argument(help="results folder, or folder of a campaign")],
     second: Annotated[Path, typer.Argument(help="another one")],
 ) -> None:
-    """Say whether two results folders hold the same data: bit-equal but for times.
+    """Say whether two results folders, or two campaigns, hold the same data: bit-equal but for times.
 
     Example:
       raptor same results/laptop results/again
     """
     from raptor.dataset.compare import differences
 
-    for folder in (first, second):
-        if not (folder / "dataset" / "fields.nc").is_file():
-            raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder")
     found = differences(first, second)
     for difference in found:
         typer.echo(difference)

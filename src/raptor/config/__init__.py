@@ -1,15 +1,6 @@
-"""The typed configuration: blocks, the whole, its reading."""
+"""The typed configuration: the blocks that the package works by, put together, and its reading."""
 
-from raptor.config.configuration import Configuration, content_hash
+from raptor.config.configuration import Configuration
 from raptor.config.reading import load, parse, require_castable, require_measurable
-from raptor.config.sweep import Sweep
 
-__all__ = [
-    "Configuration",
-    "Sweep",
-    "content_hash",
-    "load",
-    "parse",
-    "require_castable",
-    "require_measurable",
-]
+__all__ = ["Configuration", "load", "parse", "require_castable", "require_measurable"]

@@ -1,223 +1,266 @@
 """The whole configuration: one model from which defaults, JSON schema and key table are made."""
 
-import hashlib
-import json
-from typing import Any
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from raptor.condor.simulate import accuracy_named
-from raptor.config.blocks import Dataset, Design, Fields, Fit, Further, Model, Moulds, Simulation, Surrogate
-from raptor.config.sweep import Sweep
-from raptor.config.tradeoff import Tradeoff, TradeoffCase
-from raptor.core.blocks import Block, Name
-from raptor.core.device import Device
+from raptor.config.blocks import Fit, Model
+from raptor.core.blocks import Block, Name, Positive, content_hash
 from raptor.core.version import MODEL_VERSION, STACK_FORMAT
-from raptor.dataset.design import DesignRules
+from raptor.dataset.campaign import Campaign, Design, Grid
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.random_moulds import RandomMoulds
-from raptor.parameters import Bounds, NetworkModel
+from raptor.moulds.random_moulds import MARGIN, RandomMoulds
+from raptor.parameters import NetworkModel
+from raptor.studies.tradeoff import SURROGATE, Tradeoff
+
+CAMPAIGNS = {
+    "paper": Campaign(runs=64, test=12, validation=8, edge=8),
+    "replicates": Campaign(repeat_of="paper", runs=3, seeds=2),
+    "long_bars": Campaign(moulds="long_bars", runs=2),
+    "slender_strips": Campaign(moulds="slender_strips", runs=2),
+    "soft_corner": Campaign(runs=2, delta=(0.85, 0.95), kappa_nnn=(0.1, 0.2), kappa_nnnn=(0.01, 0.05)),
+    "sweep": Campaign(
+        moulds=("four_post_rectangle", "i_shape"),
+        grid=Grid(delta=(0.1, 0.5, 0.9), kappa_nnn=(0.1, 0.7), ratio=(0.1, 0.7)),
+        seeds=2,
+    ),
+}
+MODELS: dict[str, dict[str, Any]] = {
+    "film_unet": {},
+    "pix2pix": {"network": "pix2pix", "adversarial": 1.0, "beta1": 0.5, "ensemble_size": 1},
+}
 
 
 class Configuration(Block):
-    """A data set factory's run, from moulds to fitted tissues."""
+    """A run of the factory, from moulds to fitted tissues."""
 
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
-    device: Device = Field(
-        "auto",
-        description="where simulations and images are made and networks trained; auto: on a GPU where a "
-        "job is given one (profiles gpu and slurm) and sees it",
+    layers: int = Field(4, ge=1, le=64, description="cell layers between floor and fill height")
+    shells: tuple[int, int, int] = Field(
+        (1, 2, 3), description="neighbour shells of kappa0, kappa_nnn and kappa_nnnn"
     )
-    design: Design = Field(default_factory=lambda: Design())
-    moulds: Moulds = Field(default_factory=lambda: Moulds())
-    model: Model = Field(default_factory=lambda: Model())
-    simulation: Simulation = Field(default_factory=lambda: Simulation())
-    fields: Fields = Field(default_factory=lambda: Fields())
-    dataset: Dataset = Field(default_factory=lambda: Dataset())
-    surrogate: Surrogate = Field(default_factory=lambda: Surrogate())
-    compared: dict[Name, dict[str, Any]] = Field(
-        {"pix2pix": {"network": "pix2pix", "adversarial": 1.0, "beta1": 0.5}},
-        description="further models to compare: what surrogate is, but for the keys given, and one network",
+    tension: Literal["hooke", "literal"] = Field(
+        "hooke", description="hooke: k (|l| - L'); literal: k L', the paper's formula"
     )
-    chosen: Name | None = Field(
+    accuracy: Literal["draft", "standard", "reference"] = Field(
+        "standard", description="of every simulation: draft, standard or reference"
+    )
+    pixels: Literal[16, 32, 64, 128, 256, 512] = Field(128, description="side of the square images of fields")
+    shard_size: Positive = Field(4, description="simulations a job and a file; does not change results")
+    check_fraction: float = Field(
+        1.0, gt=0, le=1, description="share of the simulations, chosen at random, that checks compute again"
+    )
+    mould_scale: float = Field(
+        0.7, gt=0, le=1.1, description="moulds of the library are cast at this fraction of their size"
+    )
+    random_moulds: RandomMoulds = Field(default_factory=lambda: RandomMoulds())
+    campaigns: dict[Name, Campaign] = Field(
+        default_factory=lambda: dict(CAMPAIGNS),
+        min_length=1,
+        description="everything that is simulated, by name; a new study is one more entry",
+    )
+    models: dict[Name, Model] = Field(
+        default_factory=lambda: dict(MODELS),
+        validate_default=True,
+        description="models to train and compare, by name; what one does not state is as in the first. "
+        "Empty: simulate only",
+    )
+    selected_model: Name | None = Field(
         None,
-        description="the model that tissues are fitted and figures drawn by, and that is shipped; "
-        "null: surrogate.model",
+        description="the surrogate: the model by which tissues are fitted and figures drawn; null: the first",
     )
-    further: Further = Field(default_factory=lambda: Further())
     fit: Fit = Field(default_factory=lambda: Fit())
-    sweep: Sweep = Field(default_factory=lambda: Sweep())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
+
+    @field_validator("models", mode="before")
+    @classmethod
+    def _like_the_first(cls, given: Any) -> Any:
+        return _completed(given) if isinstance(given, dict) else given
 
     @model_validator(mode="after")
     def _consistent(self) -> "Configuration":
-        side = IMAGE_SIZE - 2 * self.moulds.margin
-        if self.moulds.cells[1] > 0.9 * side**2 * self.model.layers:
+        assert self.network_model  # its shells are allowed
+        side = IMAGE_SIZE - 2 * MARGIN
+        if self.random_moulds.cells[1] > 0.9 * side**2 * self.layers:
             raise ValueError(
-                f"moulds.cells allows {self.moulds.cells[1]} cells, more than {self.model.layers} "
-                f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise model.layers"
+                f"random_moulds.cells allows {self.random_moulds.cells[1]} cells, more than {self.layers} "
+                f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise layers"
             )
-        if self.device == "cuda" and not accuracy_named(self.simulation.accuracy).contracts_alone:
+        if self.selected_model is not None and self.selected_model not in self.models:
             raise ValueError(
-                "device is cuda, where simulations are contracted at draft or standard; for accuracy: "
-                f"{self.simulation.accuracy} choose device: auto or cpu"
+                f"selected_model is '{self.selected_model}'; allowed are {', '.join(self.models)}"
             )
+        for name, campaign in self.campaigns.items():
+            self._check_campaign(name, campaign)
         for name, model in self.models.items():
-            if model.extra and not self.further.extra:
+            self._check_model(name, model)
+        self._order()
+        for pixels in self.tradeoff.rasters:
+            if max(pixels, self.pixels) % min(pixels, self.pixels):
                 raise ValueError(
-                    f"{name}.extra is {model.extra}, of which there are no simulations; raise further.extra"
-                )
-            if model.extra and name == self.surrogate.model:
-                raise ValueError("surrogate.extra: the enriched set is chosen by surrogate; use compared")
-            if model.initial_weights:
-                self._can_continue(name, model)
-        if self.chosen_model not in self.models:
-            raise ValueError(f"chosen is '{self.chosen}'; allowed are {', '.join(self.models)}")
-        for pixels in self.tradeoff.pixels:
-            if max(pixels, self.fields.pixels) % min(pixels, self.fields.pixels):
-                raise ValueError(
-                    f"tradeoff.pixels has {pixels}, no whole part or multiple of fields.pixels "
-                    f"({self.fields.pixels}); choose one that is"
+                    f"tradeoff.methods has {pixels} pixels, no whole part or multiple of pixels "
+                    f"({self.pixels}); choose one that is"
                 )
         return self
 
-    def _can_continue(self, name: str, model: Surrogate) -> None:
-        """A model goes on from one listed before it, so that there is no circle, and of its architecture."""
-        earlier = list(self.models)[: list(self.models).index(name)]
-        if model.initial_weights not in earlier:
+    def _check_campaign(self, name: str, campaign: Campaign) -> None:
+        """What a campaign refers to is there."""
+        if campaign.repeat_of is not None:
+            repeated = self.campaigns.get(campaign.repeat_of)
+            if repeated is None or repeated.repeat_of is not None:
+                known = ", ".join(each for each, other in self.campaigns.items() if other.repeat_of is None)
+                raise ValueError(f"campaigns.{name}.repeat_of is '{campaign.repeat_of}'; allowed are {known}")
+        if campaign.selected_by is not None and campaign.selected_by not in self.models:
             raise ValueError(
-                f"{name}.initial_weights is '{model.initial_weights}', no model listed before it; allowed "
-                f"are {', '.join(earlier) or 'none'}"
+                f"campaigns.{name}.selected_by is '{campaign.selected_by}'; allowed are "
+                f"{', '.join(self.models) or 'none'}"
             )
-        begun = self.models[model.initial_weights]
-        for key in ("network", "base_channels", "pixels"):
-            if getattr(model, key) != getattr(begun, key):
-                raise ValueError(f"{name}.{key} differs from that of {begun.model}, which it starts from")
-        if model.ensemble_size > begun.ensemble_size:
+
+    def _check_model(self, name: str, model: Model) -> None:
+        """A model learns from campaigns that have what it needs, and goes on from one of its architecture."""
+        for campaign in model.campaigns:
+            block = self.campaigns.get(campaign)
+            if block is None:
+                raise ValueError(
+                    f"models.{name}.campaigns has '{campaign}'; allowed are {', '.join(self.campaigns)} "
+                    "(or state models: {} to simulate only)"
+                )
+            if block.kind is None or block.tests + block.validation >= block.runs:
+                raise ValueError(
+                    f"models.{name}.campaigns: {campaign} has no run to train on; lower its test or "
+                    "validation"
+                )
+        first = self.campaigns[model.campaigns[0]]
+        if not first.validation or not first.tests:
             raise ValueError(
-                f"{name}.ensemble_size is {model.ensemble_size}; {begun.model}, which it starts from, "
-                f"has {begun.ensemble_size}"
+                f"models.{name}.campaigns: {model.campaigns[0]} comes first, so it needs test and validation"
+            )
+        if model.initial_weights is None:
+            return
+        initial = self.models.get(model.initial_weights)
+        if initial is None:
+            raise ValueError(
+                f"models.{name}.initial_weights is '{model.initial_weights}'; allowed are "
+                f"{', '.join(self.models)}"
+            )
+        for key in ("network", "base_channels", "pixels"):
+            if getattr(model, key) != getattr(initial, key):
+                raise ValueError(f"models.{name}.{key} differs from that of its initial_weights")
+        if model.ensemble_size > initial.ensemble_size:
+            raise ValueError(
+                f"models.{name}.ensemble_size is {model.ensemble_size}; its initial_weights has "
+                f"{initial.ensemble_size}"
             )
         if model.adversarial:
-            raise ValueError(f"{name}.initial_weights: no discriminator is kept; set adversarial: 0")
+            raise ValueError(f"models.{name}.initial_weights: no discriminator is kept; set adversarial: 0")
+        if model.campaigns[0] != initial.campaigns[0]:
+            raise ValueError(f"models.{name}.campaigns: the first is not that of its initial_weights")
+
+    def _order(self) -> None:
+        """Campaigns and models can be made one after another, without a circle."""
+        needs: dict[str, list[str]] = {}
+        for name, campaign in self.campaigns.items():
+            needs[f"campaigns.{name}"] = [f"models.{each}" for each in (campaign.selected_by,) if each]
+        for name, model in self.models.items():
+            needs[f"models.{name}"] = [f"campaigns.{each}" for each in model.campaigns]
+            needs[f"models.{name}"] += [f"models.{each}" for each in (model.initial_weights,) if each]
+        try:
+            TopologicalSorter(needs).prepare()
+        except CycleError as error:
+            raise ValueError(f"each of these waits for the next: {', '.join(error.args[1])}") from error
 
     @property
-    def chosen_model(self) -> str:
-        """Name of the model that tissues are fitted by, and that is shipped."""
-        return self.chosen or self.surrogate.model
+    def surrogate(self) -> str | None:
+        """Name of the selected model; None without any."""
+        return self.selected_model or next(iter(self.models), None)
 
     @property
-    def shards(self) -> list[str]:
-        """Names of the design's shards."""
-        return self.shards_of(self.design.simulations)
+    def training_campaign(self) -> str | None:
+        """The campaign whose runs scale fields, validate models and test them; None without models."""
+        return next((model.campaigns[0] for model in self.models.values()), None)
 
-    def shards_of(self, simulations: int) -> list[str]:
-        """Names of the shards of so many simulations: the first and the last of each."""
-        size, last = self.simulation.shard_size, simulations - 1
-        return [f"{i:05d}-{min(i + size - 1, last):05d}" for i in range(0, last + 1, size)]
+    def design(self, campaign: str) -> Design:
+        """All that the design of a campaign depends on, other campaigns and models aside."""
+        block = self.campaigns[campaign]
+        return Design(
+            name=campaign,
+            seed=self.seed,
+            layers=self.layers if block.kind else None,
+            mould_scale=self.mould_scale if block.files() else None,
+            random_moulds=self.random_moulds if block.kind else None,
+            campaign=block,
+        )
+
+    def simulations(self, campaign: str) -> int:
+        """Simulations of a campaign."""
+        block = self.campaigns[campaign]
+        if block.repeat_of is None:
+            return block.simulations()
+        return block.simulations(self.campaigns[block.repeat_of].test_simulations())
+
+    def shards(self, campaign: str) -> list[str]:
+        """Names of a campaign's shards: the first and the last simulation of each."""
+        count, size = self.simulations(campaign), self.shard_size
+        return [f"{first:05d}-{min(first + size, count) - 1:05d}" for first in range(0, count, size)]
 
     @property
-    def models(self) -> dict[str, Surrogate]:
-        """Every model to be trained, by name: the surrogate first, then those compared with it."""
-        shared = self.surrogate.model_dump(mode="json") | {"ensemble_size": 1}
-        found = {self.surrogate.model: self.surrogate}
-        for name, changes in self.compared.items():
-            if name in found:
-                raise ValueError(f"compared.{name} has the name of surrogate.model; choose another")
-            unknown = sorted(set(changes) - set(shared))
-            if unknown:
-                raise ValueError(
-                    f"compared.{name} has the key '{unknown[0]}'; allowed are the keys of surrogate"
-                )
-            found[name] = Surrogate.model_validate(shared | changes | {"model": name})
-        return found
-
-    @property
-    def further_sets(self) -> dict[str, int]:
-        """Simulations of each further set that is not empty, by name."""
-        f = self.further
-        repeated = min(f.floor, self.design.test)
-        sizes = {"floor": repeated * f.seeds, "bars": f.bars, "slender": f.slender, "corner": f.corner}
-        sizes |= dict.fromkeys(("enriched", "random"), f.extra)
-        return {name: size for name, size in sizes.items() if size}
-
     def network_model(self) -> NetworkModel:
-        """The model of the simulations."""
-        return NetworkModel(self.model.layers, self.model.shells, self.model.tension)
+        """The network of cells that is simulated."""
+        return NetworkModel(self.layers, self.shells, self.tension)
 
-    def comparison(self, case: TradeoffCase) -> dict[str, Any]:
-        """All that the comparison on one case hangs on, for the rule that makes it."""
-        model = self.model.model_dump(mode="json")
-        model["layers"] = self.model.layers if case.layers is None else case.layers
-        shared = self.tradeoff.model_dump(
-            mode="json", include={"methods", "layers", "shells", "pixels", "seeds"}
-        )
-        shared["methods"] = list(dict.fromkeys([*shared["methods"], *case.methods]))
-        alike = case.layers in (None, self.model.layers)
-        return {
-            "case": case.model_dump(mode="json", exclude={"methods"}),
-            "model": model,
-            "pixels": self.fields.pixels,
-            "seed": self.seed,
-            "comparison": shared,
-            "surrogate": self.tradeoff.surrogate and alike,
-        }
+    @property
+    def simulator(self) -> dict[str, Any]:
+        """How tissues are simulated: all that a simulation depends on beside mould, parameters and seed."""
+        return self.model_dump(mode="json", include={"layers", "shells", "tension", "accuracy"})
 
-    def random_moulds(self) -> RandomMoulds:
-        """What moulds are drawn from."""
-        m = self.moulds
-        symmetry: dict[str, float] = {str(k): v for k, v in m.symmetry.items()}
-        return RandomMoulds(
-            m.cells, self.model.layers, m.tethers, m.tether_radius, m.arm_width, m.margin, symmetry
-        )
+    def trial(self, case: str) -> dict[str, Any]:
+        """All that the comparison of methods on a case depends on beside the methods and its mould's file."""
+        chosen = self.tradeoff.cases[case].model_dump(mode="json")
+        simulator = self.model_dump(mode="json", include={"layers", "shells", "tension", "pixels", "seed"})
+        alike = chosen["layers"] in (None, self.layers)
+        chosen["layers"] = chosen["layers"] or self.layers
+        return simulator | chosen | {"name": case, "surrogate": alike and self.compares_surrogate}
 
-    def dump_drawn(self, *further: str) -> dict[str, Any]:
-        """What designs are drawn from, and further blocks by name, for the rules that draw them."""
-        blocks: Any = {"seed": True, "design": True, "moulds": True, "model": {"layers"}}
-        return self.model_dump(mode="json", include=blocks | dict.fromkeys(further, True))
+    @property
+    def compares_surrogate(self) -> bool:
+        """Whether there is a surrogate to compare with methods of simulation."""
+        return bool(self.models) and SURROGATE in self.tradeoff.methods
 
-    def design_rules(self) -> DesignRules:
-        """What the design is drawn from."""
-        d = self.design
-        ranges = (Bounds(*d.delta), Bounds(*d.kappa_nnn), Bounds(*d.kappa_nnnn))
-        return DesignRules(d.simulations, d.test, d.validation, d.edge, *ranges)
-
-    def fingerprint(self, stage: str) -> str:
-        """Hash of the configuration that a stage's files depend on, model version included."""
-        return content_hash(self._depends(stage))
-
-    def further_fingerprint(self, name: str) -> str:
-        """Hash of the configuration that a further set depends on."""
-        own = {"floor": self.further.seeds, "enriched": self.further.candidates}.get(name)
-        return content_hash([self._depends("dataset"), name, self.further_sets[name], own])
-
-    def sweep_fingerprint(self) -> str:
-        """Hash of the configuration that simulations of sweeps depend on, model version included."""
-        own = self.sweep.model_dump(mode="json", exclude={"moulds", "panels"})
-        model = self.model.model_dump(mode="json")
-        return content_hash([self.seed, own, model, self.simulation.accuracy, MODEL_VERSION])
-
-    def model_fingerprint(self, name: str) -> str:
-        """Hash of the configuration that each member of a model depends on, and the one it continues."""
-        model = self.models[name]
-        own = model.model_dump(mode="json", exclude={"ensemble_size"})
-        begun = self.model_fingerprint(model.initial_weights) if model.initial_weights else None
-        return content_hash([self._depends("dataset"), own, begun])
-
-    def _depends(self, stage: str) -> Any:
-        dump = self.model_dump(mode="json")
-        design = [self.seed, dump["design"], dump["moulds"], self.model.layers, MODEL_VERSION]
-        simulation = [design, dump["model"], self.simulation.accuracy]
-        dataset = [simulation, dump["fields"], STACK_FORMAT]
+    def fingerprint(self, stage: Literal["design", "simulation", "fields"], campaign: str) -> str:
+        """Hash of the configuration that a campaign's files of a stage depend on, model version included."""
+        block = self.campaigns[campaign]
+        design = [
+            self.design(campaign).model_dump(mode="json"),
+            self.fingerprint("design", block.repeat_of) if block.repeat_of else None,
+            self.model_fingerprint(block.selected_by) if block.selected_by else None,
+            MODEL_VERSION,
+        ]
+        simulation = [design, self.simulator]
         stages = {
             "design": design,
             "simulation": simulation,
-            "dataset": dataset,
+            "fields": [simulation, self.pixels, STACK_FORMAT],
         }
-        return stages[stage]
+        return content_hash(stages[stage])
+
+    def model_fingerprint(self, name: str) -> str:
+        """Hash of the configuration that each network of a model depends on."""
+        model = self.models[name]
+        return content_hash(
+            [
+                [self.fingerprint("fields", campaign) for campaign in model.campaigns],
+                model.model_dump(mode="json", exclude={"ensemble_size", "campaigns"}),
+                self.model_fingerprint(model.initial_weights) if model.initial_weights else None,
+            ]
+        )
 
 
-def content_hash(content: Any) -> str:
-    """Short hash of anything that JSON can hold."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+def _completed(models: dict[str, Any]) -> dict[str, Any]:
+    """Models, what one does not state being as in the first."""
+    blocks = {name: block if block is not None else {} for name, block in models.items()}
+    if not all(isinstance(block, dict) for block in blocks.values()):
+        return blocks
+    first: dict[str, Any] = next(iter(blocks.values()), {})
+    return {name: {**first, **block} for name, block in blocks.items()}

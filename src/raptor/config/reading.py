@@ -7,13 +7,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from raptor.config.configuration import Configuration
-from raptor.config.sweep import Sweep
-from raptor.config.tradeoff import TradeoffCase
 from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
 from raptor.moulds.cast import cast_sites, central_section
 from raptor.moulds.library.tissues import MeasuredTissue
-from raptor.moulds.reading import read_mould
+from raptor.moulds.reading import read_at_scale, read_mould
 
 
 def parse(content: Any, where: str) -> Configuration:
@@ -35,18 +33,22 @@ def load(path: Path) -> Configuration:
     return parse(read_yaml(Path(path)), str(path))
 
 
-def require_castable(cases: tuple[TradeoffCase, ...], sweep: Sweep) -> None:
-    """Find out before any work that the moulds of a comparison and of sweeps can be read and cast.
+def require_castable(configuration: Configuration) -> None:
+    """Find out before any work that every mould that is named can be read and cast.
 
     Raises
     ------
     RaptorError
-        Where a mould cannot.
+        Where one cannot.
     """
-    for case in cases:
+    for name, campaign in configuration.campaigns.items():
+        try:
+            for path in campaign.files().values():
+                cast_sites(read_at_scale(path, configuration.mould_scale), 1)
+        except RaptorError as error:
+            raise RaptorError(f"campaigns.{name}: {error}") from error
+    for case in configuration.tradeoff.cases.values():
         cast_sites(read_mould(case.mould), 1)
-    for mould in sweep.moulds:
-        cast_sites(read_mould(mould).scaled(sweep.mould_scale), 1)
 
 
 def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float) -> None:
@@ -58,7 +60,12 @@ def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float
         Where one cannot.
     """
     for name, tissue in tissues.items():
-        mould = read_mould(tissue.mould).scaled(mould_scale)
+        if not tissue.measured:
+            raise RaptorError(
+                f"tissue {name} has neither area_ratio nor width_ratio, so it cannot be fitted; simulate it "
+                f"as a campaign, with moulds: [{tissue.mould}]"
+            )
+        mould = read_at_scale(tissue.mould, mould_scale)
         cast_sites(mould, 1)
         if tissue.width_ratio is not None and not central_section(mould).intersects(mould.depression):
             raise RaptorError(

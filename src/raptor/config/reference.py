@@ -1,13 +1,14 @@
 """What is generated from the configuration model: JSON schema, defaults, key table."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 from pydantic import BaseModel
 
-from raptor.config import Configuration
+from raptor.config.configuration import Configuration
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 
@@ -16,11 +17,19 @@ DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about
 """
 README_HEAD = """# Configuration
 
-`laptop.yaml` is the default and holds every key; another file, such as `paper.yaml`, states only what
-differs and is chosen by `workflow/env snakemake --cores all --configfile config/paper.yaml`. Unknown keys
-are errors. Moulds are GeoJSON (`moulds/`), measured tissues stand in `tissues.yaml`.
+`laptop.yaml` is the default; another file, such as `paper.yaml`, states only what differs and is chosen by
+`workflow/env snakemake --cores all --configfile config/paper.yaml`. Unknown keys are errors. Everything
+simulated is an entry of `campaigns`; a new study is one more entry:
 
-This table and `laptop.yaml` are generated from the model in `src/raptor/config/` by
+```yaml
+campaigns:
+  my_mould:
+    moulds: my_mould.geojson
+    grid: {delta: [0.2, 0.5, 0.8], kappa_nnn: [0.5], ratio: [0.6]}
+    seeds: 2
+```
+
+This page and `laptop.yaml` are generated from the blocks that the package works by, with
 `workflow/env raptor reference`.
 
 """
@@ -41,12 +50,10 @@ def write_reference(root: Path) -> list[Path]:
     """
     if not (root / "config").is_dir() or not (root / "workflow").is_dir():
         raise RaptorError(f"{root.resolve()} has no config/ and workflow/; give the project's folder")
+    defaults = yaml.safe_dump(stated_defaults(), sort_keys=False, default_flow_style=None, width=100)
     contents = {
         "workflow/schemas/config.schema.json": json.dumps(json_schema(), indent=1) + "\n",
-        "config/laptop.yaml": DEFAULTS_HEAD
-        + yaml.safe_dump(
-            Configuration().model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=100
-        ),
+        "config/laptop.yaml": DEFAULTS_HEAD + defaults,
         "config/README.md": README_HEAD + key_table(),
     }
     for name, content in contents.items():
@@ -55,16 +62,52 @@ def write_reference(root: Path) -> list[Path]:
     return [root / name for name in contents]
 
 
+def stated_defaults() -> dict[str, Any]:
+    """The default configuration; of campaigns and models only what differs from theirs."""
+    content = Configuration().model_dump(mode="json")
+    for name in ("campaigns", "models"):
+        block = _block_of(name)
+        assert block is not None
+        plain = {key: entry.default for key, entry in block.model_fields.items()}
+        like = plain
+        for entry, values in content[name].items():
+            content[name][entry] = {key: value for key, value in values.items() if value != _plain(like[key])}
+            like = values if name == "models" and like is plain else like
+    return content
+
+
 def key_table() -> str:
-    """The table of keys in config/README.md, in Markdown."""
+    """The table of keys in config/README.md, in Markdown; NAME stands for the name of an entry."""
     rows = ["| key | default | meaning |", "| --- | --- | --- |"]
+    defaults = Configuration()
     for name, entry in Configuration.model_fields.items():
-        block = entry.annotation
-        if isinstance(block, type) and issubclass(block, BaseModel):
-            defaults = block()
-            for key, inner in block.model_fields.items():
-                value = json.dumps(defaults.model_dump(mode="json")[key])
-                rows.append(f"| `{name}.{key}` | `{value}` | {inner.description} |")
-        else:
-            rows.append(f"| `{name}` | `{json.dumps(entry.default)}` | {entry.description} |")
+        block, value = _block_of(name), getattr(defaults, name)
+        if block is None:
+            rows.append(_row(name, value, entry.description))
+            continue
+        entries = isinstance(value, Mapping)
+        if entries:
+            rows.append(_row(name, list(value), entry.description))
+        for key, inner in block.model_fields.items():
+            given = inner.get_default(call_default_factory=True) if entries else getattr(value, key)
+            rows.append(_row(f"{name}.NAME.{key}" if entries else f"{name}.{key}", given, inner.description))
     return "\n".join(rows) + "\n"
+
+
+def _block_of(name: str) -> type[BaseModel] | None:
+    """The block of a key, or of each of its entries; None where it is a plain value."""
+    annotation = Configuration.model_fields[name].annotation
+    kinds = (annotation, *get_args(annotation))
+    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+
+
+def _row(name: str, value: Any, description: str | None) -> str:
+    text = json.dumps(_plain(value))
+    return f"| `{name}` | `{text}` | {description} |"
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it; of entries their names."""
+    if isinstance(value, Mapping):
+        return list(value)
+    return list(value) if isinstance(value, tuple) else value

@@ -1,9 +1,11 @@
 """Blocks of typed keys: what configurations and tissue files are made of, and faults as sentences."""
 
+import hashlib
+import json
 from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -20,6 +22,11 @@ class Block(BaseModel):
     """A block of keys: unknown keys are errors, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def content_hash(content: Any) -> str:
+    """Short hash of anything that JSON can hold."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -52,11 +59,14 @@ def explain(error: ValidationError, where: str, model: type[BaseModel]) -> Itera
 
 def _keys_beside(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """Names of the keys that may stand where an unknown one was found."""
+    entry = False  # whether the next part is the name of a mapping's entry
     for part in place[:-1]:
-        if isinstance(part, int):  # an item of a list: its model is known already
+        if entry or isinstance(part, int):  # an item of a list or mapping: its model is known already
+            entry = False
             continue
-        block = model.model_fields[part].annotation
-        block = next((inner for inner in get_args(block) if isinstance(inner, type)), block)
+        annotation = model.model_fields[part].annotation
+        entry = get_origin(annotation) is dict
+        block = next((inner for inner in get_args(annotation) if isinstance(inner, type)), annotation)
         if not (isinstance(block, type) and issubclass(block, BaseModel)):
             return []
         model = block

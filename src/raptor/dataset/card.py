@@ -1,4 +1,4 @@
-"""The data set card: what a data set is, generated from the data set itself."""
+"""The card of a campaign: what the data set is, generated from the data set itself."""
 
 import os
 import platform
@@ -17,10 +17,10 @@ from raptor.dataset.stack import read_table
 from raptor.fields.labelled import LONG_NAMES
 from raptor.moulds.geometry import Mould
 
-TEMPLATE = """# Data set card: {name}
+TEMPLATE = """# Campaign: {name}
 
-**What it is.** {simulations} CONDOR simulations of cell-laden hydrogels that contract in tethered
-moulds, each with a mould of its own, and their eight fields as images.
+**What it is.** {simulations} CONDOR simulations of cell-laden hydrogels that contract in {moulds} tethered
+moulds, and their eight fields as images.
 
 **Equations.** Energy of a bond: k/2 (|l| - L')^2 with L' = L (1 - Delta/2 (2 - (u.s_i)^2 -
 (u.s_j)^2)); fields: Z_p = sum over cells of z_i w_ip, w a Gaussian of 3 x 125/512 l0 integrated over
@@ -31,7 +31,7 @@ the pixel.
 | --- | --- | --- |
 {split_rows}
 
-Moulds by symmetry: {symmetry}. Distinct images a mould of train and validation: {distinct:.2f}.
+Moulds by symmetry: {symmetry}. Distinct images a simulation of train and validation: {distinct}.
 Cells a tissue: {cells}. Images: {pixels} x {pixels} pixels.
 
 ## Fields
@@ -44,8 +44,6 @@ Cells a tissue: {cells}. Images: {pixels} x {pixels} pixels.
 | --- | --- | --- | --- |
 {parameter_rows}
 
-{edge} simulations have Delta at an end of its range.
-
 ## Model choices
 Layers: {layers}. Shells of kappa0, kappa_nnn, kappa_nnnn: {shells}. Tension: {tension}. Tethers and
 outline are walls that cells cannot enter; the gel is free between floor and fill height. Solver
@@ -53,13 +51,13 @@ accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 
 ## Cost
 {hours:.3f} {unit} in all; {median:.2f} s a simulation in the median, {p95:.2f} s at the 95th
-percentile, {where}. Not converged: {unconverged} of {simulations}. Folded bonds: at
-most {folded:.1e} of a tissue's. Simulations of the design that failed and are missing: {missing}.
+percentile, {where}. Not converged: {unconverged} of {simulations}. Inverted bonds: at
+most {inverted:.1e} of a tissue's. Simulations of the design that failed and are missing: {missing}.
 
 ## How to evaluate another simulator against it
-Simulate the moulds of `design/moulds.geojson` at the parameters of `design/design.csv`, rasterise as
-above, and compare with `dataset/fields.nc` by VRMSE over the test split. The sign of sxsz and sysz is
-spontaneous: compare their magnitude.
+Simulate the moulds of `moulds.geojson` at the parameters of `design.csv`, rasterise as above, and compare
+with `fields.nc` by VRMSE over the test split. The sign of sxsz and sysz is spontaneous: compare their
+magnitude.
 
 Reference: {references}.
 """
@@ -75,12 +73,12 @@ def card(
 ) -> str:
     """The card, in Markdown."""
     table = read_table(stack)
-    shard, times, folded, unconverged = None, [], 0.0, 0
+    shard, times, inverted, unconverged = None, [], 0.0, 0
     failures: dict[int, str] = {}
     for shard in shards:
         times += [record.wall_time for record in shard.records]
         failures |= shard.failures
-        folded = max([folded, *(record.inverted_fraction for record in shard.records)])
+        inverted = max([inverted, *(record.inverted_fraction for record in shard.records)])
         unconverged += sum(not record.converged for record in shard.records)
     assert shard is not None  # a data set has at least one shard
     augmented = Counter(table.split[example.sample] for example in examples)
@@ -91,12 +89,12 @@ def card(
         simulations=len(table.split),
         split_rows=_rows([s, simulated[s], augmented[s] or "-"] for s in SPLITS),
         symmetry=", ".join(f"{k} {v}" for k, v in Counter(m.symmetry for m in moulds).most_common()),
-        distinct=len(examples) / learnt,
+        moulds=len(moulds),
+        distinct=f"{len(examples) / learnt:.2f}" if learnt else "-",
         cells=f"{table.n_cells.min()} to {table.n_cells.max()}, median {np.median(table.n_cells):.0f}",
         pixels=table.pixels,
         field_rows=_rows(LONG_NAMES.items()),
         parameter_rows=_rows(_parameter_rows(runs)),
-        edge=sum(run.edge for run in runs),
         layers=shard.model.layers,
         shells=list(shard.model.shells),
         tension=shard.model.tension,
@@ -112,7 +110,7 @@ def card(
         else "each a share, by evaluations and cells, of a batch's time on the GPU",
         unconverged=unconverged,
         missing="; ".join(f"{n} ({reason})" for n, reason in sorted(failures.items())) or "none",
-        folded=folded,
+        inverted=inverted,
         references=REFERENCES,
     )
 

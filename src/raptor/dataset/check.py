@@ -3,7 +3,8 @@
 Each check yields faults, one sentence each; a data set without faults yields none.
 """
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +21,13 @@ from raptor.dataset.examples import mould_images, read_examples, training_scalin
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.result import CELLS
 from raptor.dataset.scaling import read_scaling
-from raptor.dataset.shards import Record, Shard, read_shard
-from raptor.dataset.stack import Sample, read_samples, read_table, record_fields
+from raptor.dataset.shards import Record, Shard, campaign_folders, read_shard
+from raptor.dataset.stack import Sample, read_masks, read_samples, read_table, record_fields
+from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_size
-from raptor.moulds.cast import cast_sites
+from raptor.moulds.cast import CastMould, cast_sites
 from raptor.moulds.geojson import moulds_by_id, read_features, read_moulds
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.moulds.reading import SUFFIXES, read_mould
 from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
@@ -35,11 +36,11 @@ RELATIVE = 1e-4  # of recomputed values: storage is float32
 WALL_YIELD = 0.1  # l0; how far a soft wall gives way
 
 
-def check(path: Path, part: float = 1.0, read: Callable[[Path], Mould] = read_mould) -> list[str]:
-    """Check a results folder, or any file of one: shard, stack, prediction, table, moulds.
+def check(path: Path, fraction: float = 1.0, read: Callable[[Path], Mould] = read_mould) -> list[str]:
+    """Check a results folder, a campaign's folder, or a file: shard, stack, prediction, table, moulds.
 
     A file of one mould, of any format, is read by `read`.
-    Energy, tension and fields of a folder are computed again for a random `part` of its simulations.
+    Energy, tension and fields of a folder are computed again for a random `fraction` of its simulations.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def check(path: Path, part: float = 1.0, read: Callable[[Path], Mould] = read_mo
     """
     path = Path(path)
     if path.is_dir():
-        return list(_check_folder(path, part))
+        return list(_check_folder(path, fraction))
     if path.suffix.lower() in SUFFIXES and path.suffix != ".json":
         return _fault_of(lambda path: _cast_moulds(path, read), path)
     if path.suffix == ".csv":
@@ -88,37 +89,75 @@ def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
     return []
 
 
-def _check_folder(folder: Path, part: float) -> Iterator[str]:
-    stack = folder / "dataset" / "fields.nc"
-    if not stack.is_file():
-        raise RaptorError(f"{folder} holds no dataset/fields.nc; give a results folder or a file")
-    runs = read_design(folder / "design" / "design.csv")
-    moulds = moulds_by_id(folder / "design" / "moulds.geojson")
+def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
+    """Every campaign of a results folder, or the one whose folder it is."""
+    campaigns = campaign_folders(folder)
+    for name, path in campaigns.items():
+        yield from (f"{name}: {fault}" for fault in check_campaign(path, fraction))
+    stacks = {name: path / "fields.nc" for name, path in campaigns.items()}
+    if len(stacks) > 1:
+        yield from check_splits({name: path for name, path in stacks.items() if path.is_file()})
+    normalisation = folder / "surrogate" / "normalisation.json"
+    if normalisation.is_file():
+        yield from _check_scaling(normalisation, stacks)
+
+
+def check_campaign(folder: Path, fraction: float = 1.0) -> Iterator[str]:
+    """All files of a campaign's folder, against the rules and against each other.
+
+    Raises
+    ------
+    RaptorError
+        Where the design, the moulds or the stack are missing.
+    """
+    stack = folder / "fields.nc"
+    runs, moulds = read_design(folder / "design.csv"), moulds_by_id(folder / "moulds.geojson")
     yield from check_design(runs, moulds)
     yield from check_stack(stack)
     with open_file(stack) as file:
         names = str(getattr(file, "shards", "")).split()
-    shards = [folder / "simulations" / name for name in names]
+    shards = [folder / "shards" / name for name in names]
     ids = np.array([run.simulation for run in runs])
-    chosen = np.random.default_rng().permutation(ids)[: max(1, round(part * len(ids)))]
+    chosen = np.random.default_rng().permutation(ids)[: max(1, round(fraction * len(ids)))]
     yield from check_against_shards(stack, shards, runs, moulds, {int(i) for i in chosen})
-    yield from check_examples(folder / "dataset", stack)
+    yield from check_examples(folder / "examples.csv", stack)
 
 
 def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
-    """Ids and seeds are unique, every mould is found and used once."""
+    """Ids and seeds are unique; every mould is found, and in one split."""
     for what, values in (
         ("simulation id", [str(run.simulation) for run in runs]),
         ("seed", [str(run.seed) for run in runs]),
-        ("mould", [run.mould for run in runs]),
     ):
         if len(set(values)) < len(values):
             twice = next(v for v in values if values.count(v) > 1)
-            splits = sorted({run.split for run, v in zip(runs, values, strict=True) if v == twice})
-            yield f"design.csv: {what} {twice} stands in two rows (splits: {', '.join(splits)})"
+            yield f"design.csv: {what} {twice} stands in two rows"
+    splits: dict[str, str] = {}
     for run in runs:
         if run.mould not in moulds:
             yield f"design.csv: mould {run.mould} of simulation {run.simulation} is not in moulds.geojson"
+        if splits.setdefault(run.mould, run.split) != run.split:
+            yield f"design.csv: mould {run.mould} stands in two splits ({splits[run.mould]}, {run.split})"
+
+
+def check_splits(stacks: Mapping[str, Path]) -> Iterator[str]:
+    """No mould, in any of its eight images, stands in two splits, within the stacks or between them.
+
+    Stacks by campaign.
+    """
+    first_seen: dict[bytes, tuple[str, str]] = {}  # not masks: they would all stay in memory
+    for campaign, path in stacks.items():
+        table = read_table(path)
+        for mould, split, masks in zip(table.mould, table.split, read_masks(path), strict=True):
+            here = f"{campaign}: {mould}"
+            for image in mould_images(masks):
+                there, other = first_seen.setdefault(image, (here, split))
+                if other != split:
+                    yield (
+                        f"{here} ({split}) is the mould of {there} ({other}), as it is or turned or "
+                        "mirrored: one mould in two splits"
+                    )
+                    break
 
 
 def check_result(path: Path) -> Iterator[str]:
@@ -176,19 +215,10 @@ def check_stack(path: Path) -> Iterator[str]:
     with open_file(path) as file:
         yield from _check_variables(file, Path(path).name, images=False)
         yield from _check_field_names(file, Path(path).name)
-    table = read_table(path)
-    first_seen: dict[bytes, tuple[int, str]] = {}  # not samples: they would all stay in memory
-    for sample in read_samples(path, range(len(table.split))):
+    for sample in read_samples(path, range(len(read_table(path).split))):
         where = f"{Path(path).name}: simulation {sample.simulation}"
         yield from _check_fields(sample.fields, sample.depression, sample.tethers, sample.n_cells, where)
-        for image in mould_images(sample):
-            other, split = first_seen.setdefault(image, (sample.simulation, sample.split))
-            if split != sample.split:
-                yield (
-                    f"{where} ({sample.split}) has the mould of simulation {other} "
-                    f"({split}), as it is or turned or mirrored: one mould in two splits"
-                )
-                break
+    yield from check_splits({Path(path).name: path})
 
 
 def _check_field_names(file: Any, name: str) -> Iterator[str]:
@@ -274,22 +304,25 @@ def check_against_shards(
             if record.simulation not in chosen:
                 continue
             (sample,) = read_samples(stack, [rows[record.simulation]])
-            yield from _compare(sample, record, run, moulds[run.mould])
+            yield from _compare(sample, record, run, moulds[run.mould], shard.model.layers)
     for simulation in sorted(uncovered):
         yield f"simulation {simulation} of {Path(stack).name} is in no readable shard"
 
 
-def _compare(sample: Sample, record: Record, run: Run, mould: Mould) -> Iterator[str]:
+def _compare(sample: Sample, record: Record, run: Run, mould: Mould, layers: int) -> Iterator[str]:
     where = f"simulation {sample.simulation}"
     stored = (sample.mould, sample.split, sample.n_cells, sample.parameters)
     if stored != (run.mould, run.split, len(record.positions), run.parameters) or (
         record.parameters != run.parameters or record.seed != run.seed
     ):
         yield f"{where}: mould, split, cells, seed or parameters differ between design, shard and stack"
-    image = mould_image(mould, sample.fields.shape[-1])
-    if (image.depression != sample.depression).any() or (image.tethers != sample.tethers).any():
+    cast = CastMould(mould, layers, sample.fields.shape[-1])
+    if (cast.depression != sample.depression).any() or (cast.tethers != sample.tethers).any():
         yield f"{where}: its masks are not those of mould {run.mould}"
     fields = record_fields(record, sample.fields.shape[-1])
+    ratios = shape_ratios(sample.fields[0], cast)
+    if not np.allclose(ratios, (sample.area_ratio, sample.width_ratio), equal_nan=True):
+        yield f"{where}: area and width ratio are not those of its density"
     for name, stored_field, field in zip(FIELDS, sample.fields, fields, strict=True):
         if np.abs(stored_field - field).max() <= RELATIVE * np.abs(field).max():
             continue
@@ -299,26 +332,31 @@ def _compare(sample: Sample, record: Record, run: Run, mould: Mould) -> Iterator
             yield f"{where}: {name} differs from the field recomputed from the shard"
 
 
-def check_examples(folder: Path, stack: Path) -> Iterator[str]:
-    """Examples exist, are listed once, and come from no test sample; scaling is the training split's."""
-    table = read_table(stack)
+def check_examples(path: Path, stack: Path) -> Iterator[str]:
+    """Examples exist, are listed once, and come from no test sample."""
+    split = read_table(stack).split
     try:
-        examples = read_examples(folder / "examples.csv")
-        scaling = read_scaling(folder / "normalisation.json")
+        examples = read_examples(path)
     except RaptorError as error:
         yield str(error)
         return
     if len(set(examples)) < len(examples):
         yield "examples.csv: an example is listed twice"
     for example in examples:
-        if not (0 <= example.sample < len(table.split) and 0 <= example.element < 8):
+        if not (0 <= example.sample < len(split) and 0 <= example.element < 8):
             yield f"examples.csv: {example} is not in {Path(stack).name}"
-        elif table.split[example.sample] == "test":
+        elif split[example.sample] == "test":
             yield f"examples.csv: sample {example.sample} is held out for test"
-    wanted = training_scaling(stack)
-    if not np.allclose(_flat(scaling), _flat(wanted), rtol=1e-6, equal_nan=True):
-        yield "normalisation.json: the constants are not those of the training split"
 
 
-def _flat(scaling: object) -> NDArray[np.float64]:
-    return np.concatenate([getattr(scaling, "offset"), getattr(scaling, "scale")])  # noqa: B009
+def _check_scaling(path: Path, stacks: Mapping[str, Path]) -> Iterator[str]:
+    """The constants are those of the training split that they name."""
+    try:
+        campaign, scaling = json.loads(path.read_text())["campaign"], read_scaling(path)
+        wanted = training_scaling(stacks[campaign])
+    except (KeyError, ValueError, RaptorError) as error:
+        yield f"{path.name}: {error}"
+        return
+    for ours, theirs in ((scaling.offset, wanted.offset), (scaling.scale, wanted.scale)):
+        if not np.allclose(ours, theirs, rtol=1e-6, equal_nan=True):
+            yield f"{path.name}: the constants are not those of the training split of {campaign}"

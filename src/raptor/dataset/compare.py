@@ -8,42 +8,52 @@ from typing import Any
 import numpy as np
 
 from raptor.dataset.netcdf import open_file
+from raptor.dataset.shards import campaign_folders
 
-TABLES = (
-    "design/design.csv",
-    "design/moulds.geojson",
-    "dataset/examples.csv",
-    "dataset/normalisation.json",
-)
+TABLES = ("design.csv", "moulds.geojson", "examples.csv")
 
 
 def differences(first: Path, second: Path) -> list[str]:
-    """What differs between two results folders, one sentence each; empty for the same data.
+    """What differs between two results folders or two campaigns, one sentence each; empty for the same data.
 
     Ordered by simulation id, every variable but wall_time must be bit-equal, and every table
     equal. Histories and times may differ.
+
+    Raises
+    ------
+    RaptorError
+        Where a folder holds no campaign, or a file of one is missing.
     """
+    if all((Path(folder) / "design.csv").is_file() for folder in (first, second)):
+        return _campaign_differences(Path(first), Path(second))
+    one, two = campaign_folders(first), campaign_folders(second)
+    found = [f"campaign {name} is in only one of the folders" for name in sorted(one.keys() ^ two.keys())]
+    for name in one.keys() & two.keys():
+        found += [f"{name}: {difference}" for difference in _campaign_differences(one[name], two[name])]
+    return sorted(found)
+
+
+def _campaign_differences(first: Path, second: Path) -> list[str]:
     found = [f"{name} differs" for name in TABLES if _table(first / name) != _table(second / name)]
-    one, two = (_simulations(Path(folder)) for folder in (first, second))
+    one, two = _simulations(first), _simulations(second)
     if one.keys() != two.keys():
         found.append(f"simulations {sorted(one.keys() ^ two.keys())} are in only one of the folders")
     for simulation in sorted(one.keys() & two.keys()):
         names = [n for n in one[simulation] if not _equal(one[simulation][n], two[simulation].get(n))]
         if names:
             found.append(f"simulation {simulation}: {', '.join(names)} differ")
-    stacks = [Path(folder) / "dataset" / "fields.nc" for folder in (first, second)]
-    with open_file(stacks[0]) as a, open_file(stacks[1]) as b:
+    with open_file(first / "fields.nc") as a, open_file(second / "fields.nc") as b:
         found += [f"fields.nc: {n} differs" for n in a.variables if not _equal(a[n][:], b[n][:])]
     return found
 
 
 def _simulations(folder: Path) -> dict[int, dict[str, Any]]:
-    """Every variable of every simulation of a folder, but its wall time."""
-    with open_file(folder / "dataset" / "fields.nc") as stack:
+    """Every variable of every simulation of a campaign's folder, but its wall time."""
+    with open_file(folder / "fields.nc") as stack:
         shards = str(stack.shards).split()
     found: dict[int, dict[str, Any]] = {}
     for shard in shards:
-        with open_file(folder / "simulations" / shard) as file:
+        with open_file(folder / "shards" / shard) as file:
             ends = np.cumsum(file["row_size"][:])
             for row, end in enumerate(ends):
                 cells = slice(end - file["row_size"][row], end)

@@ -1,17 +1,17 @@
 """Augmentation by D4: which images of which samples are examples for training."""
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, decoded
-from raptor.dataset.netcdf import create
 from raptor.dataset.scaling import Scaling, fit_scaling
-from raptor.dataset.stack import Sample, create_stack, read_samples, read_table
+from raptor.dataset.stack import Sample, read_masks, read_samples, read_table
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 
@@ -23,42 +23,42 @@ class Example:
     element: int
 
 
-def mould_images(sample: Sample) -> list[bytes]:
-    """The eight images of a sample's mould, comparable byte by byte."""
-    masks = np.stack([sample.depression, sample.tethers])
+def mould_images(masks: NDArray[np.uint8]) -> list[bytes]:
+    """The eight images of a mould's masks (2, y, x), comparable byte by byte."""
     return [np.packbits(move_pixels(masks, element)).tobytes() for element in Element.all()]
 
 
-def augment(stack: Path, splits: Iterable[str] = ("train", "validation")) -> list[Example]:
+def list_examples(stack: Path, splits: Iterable[str] = ("train", "validation")) -> list[Example]:
     """Every distinct image of every sample: a copy whose mould image equals an earlier is left out.
 
     Moulds are compared with all earlier ones, not only with their own images, so an image that
     two moulds share is listed once.
     """
     seen: set[bytes] = set()
-    examples = []
-    rows = read_table(stack).rows(*splits)
-    for row, sample in zip(rows, read_samples(stack, rows), strict=True):
-        for element, image in enumerate(mould_images(sample)):
+    examples, rows = [], set(read_table(stack).rows(*splits))
+    for row, masks in enumerate(read_masks(stack)):
+        for element, image in enumerate(mould_images(masks) if row in rows else ()):
             if image not in seen:
                 seen.add(image)
                 examples.append(Example(row, element))
     return examples
 
 
-def with_further(
-    stack: Path, examples: list[Example], further: Iterable[Path]
+def join_examples(
+    stacks: Sequence[Path], examples: Sequence[list[Example]]
 ) -> tuple[list[Example], list[str]]:
-    """Examples of a stack and of the training samples of further ones, and splits of all their samples.
+    """Examples of several stacks as one list, and the splits of all their samples.
 
-    Rows are counted through the stacks, as `ExampleSet` counts them.
+    Rows are counted through the stacks, as `ExampleSet` counts them. Of all but the first the training split
+    alone is taken: one campaign validates.
     """
-    joined, splits = list(examples), list(read_table(stack).split)
-    for other in further:
-        joined += [
-            replace(example, sample=len(splits) + example.sample) for example in augment(other, ["train"])
-        ]
-        splits += read_table(other).split
+    joined: list[Example] = []
+    splits: list[str] = []
+    for number, (stack, listed) in enumerate(zip(stacks, examples, strict=True)):
+        own = read_table(stack).split
+        chosen = [example for example in listed if number == 0 or own[example.sample] == "train"]
+        joined += [replace(example, sample=len(splits) + example.sample) for example in chosen]
+        splits += own
     return joined, splits
 
 
@@ -75,7 +75,7 @@ def training_scaling(stack: Path) -> Scaling:
         low = np.fmin(low, sample.fields.min(axis=(1, 2)))
         high = np.fmax(high, sample.fields.max(axis=(1, 2)))
     if not np.isfinite(low).all():
-        raise RaptorError(f"{stack} has no training sample; lower design.test or design.validation")
+        raise RaptorError(f"{stack} has no training sample; lower the campaign's test or validation")
     return fit_scaling(low, high)
 
 
@@ -110,15 +110,3 @@ def transform_sample(sample: Sample, element: Element) -> Sample:
         depression=np.ascontiguousarray(move_pixels(sample.depression, element)),
         tethers=np.ascontiguousarray(move_pixels(sample.tethers, element)),
     )
-
-
-def materialise(path: Path, stack: Path, examples: list[Example], configuration: str) -> None:
-    """Write the augmented stack as netCDF, for other people's tools."""
-    with create(path, "CONDOR fields, augmented by D4", configuration) as file:
-        write = create_stack(file, len(examples), read_table(stack).pixels)
-        element = file.createVariable("element", "i1", ("sample",))
-        element.long_name, element.units = "element of D4 that made the example", "1"
-        for row, example in enumerate(examples):
-            (sample,) = read_samples(stack, [example.sample])
-            write(row, transform_sample(sample, Element.from_index(example.element)))
-            element[row] = example.element

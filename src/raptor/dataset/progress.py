@@ -1,4 +1,4 @@
-"""How far a data set is: done, failed, rate, time left."""
+"""How far campaigns are: done, failed, rate, time left."""
 
 import time
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from raptor.dataset.design import read_design
 from raptor.dataset.netcdf import open_file
-from raptor.dataset.shards import read_failures, shard_paths
+from raptor.dataset.shards import campaign_folders, read_failures, shard_paths
 
 WINDOW = 1800.0  # s over which the rate is taken
 
@@ -37,16 +37,17 @@ class Progress:
 
 
 def progress_of(folder: Path) -> Progress:
-    """Look at a results folder, finished or being made.
+    """Look at a results folder, or at a campaign's, finished or being made.
 
     Raises
     ------
     RaptorError
         Where it has no design, or a shard cannot be read.
     """
-    designed = len(read_design(folder / "design" / "design.csv"))
+    campaigns = campaign_folders(folder).values()
+    designed = sum(len(read_design(path / "design.csv")) for path in campaigns)
     now, done, failed, lately, since = time.time(), 0, 0, 0, 0.0
-    for path in shard_paths(folder):
+    for path in (shard for campaign in campaigns for shard in shard_paths(campaign)):
         with open_file(path) as file:
             made, took = file.dimensions["simulation"].size, float(file["wall_time"][:].sum())
         done += made

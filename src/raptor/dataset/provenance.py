@@ -30,11 +30,11 @@ def trace_example(folder: Path, example: int) -> dict[str, Any]:
     RaptorError
         Where there is no such row, or a file on the way is missing.
     """
-    examples = read_examples(folder / "dataset" / "examples.csv")
+    examples = read_examples(folder / "examples.csv")
     if not 0 <= example < len(examples):
         raise RaptorError(f"{folder} has examples 0 to {len(examples) - 1}; example {example} is not there")
     chosen = examples[example]
-    table = read_table(folder / "dataset" / "fields.nc")
+    table = read_table(folder / "fields.nc")
     matrix = Element.from_index(chosen.element).matrix
     image = {"element": chosen.element, "matrix": matrix.astype(int).tolist()}
     simulation = int(table.simulation[chosen.sample])
@@ -42,7 +42,7 @@ def trace_example(folder: Path, example: int) -> dict[str, Any]:
 
 
 def trace_simulation(folder: Path, simulation: int) -> dict[str, Any]:
-    """Where a simulation's fields come from, as plain values; files by their place in the folder.
+    """Where a simulation's fields come from, as plain values; files by their place in the campaign's folder.
 
     Raises
     ------
@@ -50,17 +50,18 @@ def trace_simulation(folder: Path, simulation: int) -> dict[str, Any]:
         Where the design does not have the simulation, or a file on the way is missing.
     """
     folder = Path(folder)
-    runs = {run.simulation: run for run in read_design(folder / "design" / "design.csv")}
+    runs = {run.simulation: run for run in read_design(folder / "design.csv")}
     if simulation not in runs:
         raise RaptorError(f"{folder} has simulations {min(runs)} to {max(runs)}, not {simulation}")
     run = runs[simulation]
-    mould = moulds_by_id(folder / "design" / "moulds.geojson", {run.mould})[run.mould]
+    mould = moulds_by_id(folder / "moulds.geojson", {run.mould})[run.mould]
     return {
         "simulation": simulation,
         "split": run.split,
-        "mould": {"id": run.mould, "file": "design/moulds.geojson", **_describe(mould.as_feature())},
+        "mould": {"id": run.mould, "file": "moulds.geojson", **_describe(mould.as_feature())},
         "parameters": {name: getattr(run.parameters, name) for name in PARAMETERS},
         "seed": run.seed,
+        **run.own,
         **_trace_shard(folder, simulation),
         **_trace_stack(folder, simulation),
     }
@@ -75,7 +76,7 @@ def _describe(feature: dict[str, Any]) -> dict[str, Any]:
 def _trace_shard(folder: Path, simulation: int) -> dict[str, Any]:
     """The shard that holds a simulation, what made it, and how the simulation ended."""
     for path in shard_paths(folder):
-        place = f"simulations/{path.name}"
+        place = f"shards/{path.name}"
         failures = read_failures(path)
         if simulation in failures:
             return {"shard": place, "failed": failures[simulation]}
@@ -89,14 +90,14 @@ def _trace_shard(folder: Path, simulation: int) -> dict[str, Any]:
 
 def _trace_stack(folder: Path, simulation: int) -> dict[str, Any]:
     """The row of the stack, and how its fields were made from cells."""
-    path = folder / "dataset" / "fields.nc"
+    path = folder / "fields.nc"
     rows = [row for row, number in enumerate(read_table(path).simulation) if number == simulation]
     if not rows:
         return {}
     with open_file(path) as file:
         pixels = file.dimensions["x"].size
         raster = {"pixels": pixels, "pixel_size": pixel_size(pixels), "sigma": SIGMA}
-        made = {"file": "dataset/fields.nc", "sample": rows[0], "source": str(file.source)}
+        made = {"file": "fields.nc", "sample": rows[0], "source": str(file.source)}
         return {"fields": {**made, "raster": raster, "meaning": dict(LONG_NAMES)}}
 
 

@@ -56,7 +56,7 @@ def save(result: Result, path: str | Path) -> None:
                 cells = file.createGroup(CELLS)
                 cells.setncatts(about)
                 write_model(cells, result.model, result.accuracy, "cpu")
-                run = Run(0, result.mould.name, "test", False, result.parameters, result.seed)
+                run = Run(0, result.mould.name, "test", result.parameters, result.seed)
                 write_simulations(cells, [run], [result])
 
 

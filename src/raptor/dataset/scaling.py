@@ -82,12 +82,13 @@ def scale_inputs(
     return channels
 
 
-def write_scaling(path: Path, scaling: Scaling) -> None:
-    """Write the constants, with the formula and its inverse in words."""
+def write_scaling(path: Path, scaling: Scaling, campaign: str) -> None:
+    """Write the constants of a campaign's training split, with the formula and its inverse in words."""
     content = scaling.as_json() | {
         "formula": "scaled = (value - offset) / scale",
         "inverse": "value = scaled * scale + offset",
         "from": "the training split alone",
+        "campaign": campaign,
     }
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")

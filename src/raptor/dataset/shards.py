@@ -142,9 +142,28 @@ def _columns(simulation: Tissue) -> NDArray[np.float64]:
     )
 
 
+def campaign_folders(folder: Path) -> dict[str, Path]:
+    """Folders of the campaigns of a results folder, by name; of a campaign's own folder that one.
+
+    Raises
+    ------
+    RaptorError
+        Where the folder is neither.
+    """
+    folder = Path(folder)
+    if (folder / "design.csv").is_file():
+        return {folder.resolve().name: folder}
+    found = {path.parent.name: path.parent for path in sorted(folder.glob("campaigns/*/design.csv"))}
+    if not found:
+        raise RaptorError(
+            f"{folder} holds neither design.csv nor campaigns/; give a results folder or a campaign's"
+        )
+    return found
+
+
 def shard_paths(folder: Path) -> list[Path]:
-    """Shards of a results folder; not those that are being written, whose names begin with a dot."""
-    return sorted((Path(folder) / "simulations").glob("[0-9]*.nc"))
+    """Shards of a campaign's folder; not those that are being written, whose names begin with a dot."""
+    return sorted((Path(folder) / "shards").glob("[0-9]*.nc"))
 
 
 def read_failures(path: Path, configuration: str | None = None) -> dict[int, str]:
@@ -194,7 +213,7 @@ def read_shard(path: Path, configuration: str | None = None, group: str | None =
                 _read_records(file),
                 model,
                 str(file.accuracy),
-                str(getattr(file, "device", "cpu")),  # not stated by shards older than batches
+                str(file.device),
                 str(file.configuration),
                 _read_failures(file),
             )

@@ -1,6 +1,6 @@
 """The field stack: every simulation as eight images beside its mould, in physical units."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -14,17 +14,18 @@ from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
 from raptor.dataset.shards import Record, read_failures, read_shard, write_model
 from raptor.fields.labelled import LONG_NAMES
+from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_centres
+from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.moulds.raster import mould_image
 from raptor.parameters import PARAMETERS, CellParameters
-from raptor.raster import rasterise
+from raptor.raster import density_threshold, rasterise
 from raptor.symmetry import FIELDS
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One sample of a stack: fields (8, y, x), masks (y, x), and where it comes from."""
+    """One sample of a stack: fields (8, y, x), masks (y, x), measures, and where it comes from."""
 
     fields: NDArray[np.float32]
     depression: NDArray[np.uint8]
@@ -36,6 +37,8 @@ class Sample:
     split: str
     n_cells: int
     converged: bool
+    area_ratio: float
+    width_ratio: float
 
 
 def record_fields(record: Record, pixels: int, device: str = "cpu") -> NDArray[np.float32]:
@@ -97,19 +100,21 @@ def build_stack(
                     )
                 left.remove(record.simulation)
                 run = by_id[record.simulation]
-                write(order[record.simulation], _sample(record, run, moulds[run.mould], pixels, device))
+                fields = record_fields(record, pixels, device)
+                cast_mould = CastMould(moulds[run.mould], shard.model.layers, pixels)
+                write(order[record.simulation], _sample(record, run, cast_mould, fields))
                 on_progress(order[record.simulation])
         if left:
             raise RaptorError(f"simulations {sorted(left)[:8]} are in no shard; run the workflow again")
 
 
-def _sample(record: Record, run: Run, mould: Mould, pixels: int, device: str) -> Sample:
-    """A simulation as images, and where it comes from."""
-    image = mould_image(mould, pixels)
+def _sample(record: Record, run: Run, mould: CastMould, fields: NDArray[np.float32]) -> Sample:
+    """A simulation as images (8, y, x), with what is measured of them and where it comes from."""
+    area_ratio, width_ratio = shape_ratios(fields[0], mould)
     return Sample(
-        fields=record_fields(record, pixels, device),
-        depression=image.depression.astype(np.uint8),
-        tethers=image.tethers.astype(np.uint8),
+        fields=fields,
+        depression=mould.depression.astype(np.uint8),
+        tethers=mould.tethers.astype(np.uint8),
         parameters=run.parameters,
         simulation=run.simulation,
         seed=run.seed,
@@ -117,6 +122,8 @@ def _sample(record: Record, run: Run, mould: Mould, pixels: int, device: str) ->
         split=run.split,
         n_cells=len(record.positions),
         converged=record.converged,
+        area_ratio=area_ratio,
+        width_ratio=width_ratio,
     )
 
 
@@ -157,6 +164,8 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         "split": (str, along, "train, validation or test", {}),
         "n_cells": ("i4", along, "number of cells", {}),
         "converged": ("i1", along, "1 where the simulation met its solver's tolerance", {}),
+        "area_ratio": ("f8", along, "A/A0", {}),
+        "width_ratio": ("f8", along, "w/w0; NaN where the central section holds no material", {}),
     }  # fmt: skip
     for name, (kind, dimensions, long_name, options) in columns.items():
         made = file.createVariable(name, cast(Any, kind), dimensions, **options)
@@ -179,10 +188,20 @@ class StackTable:
     n_cells: NDArray[np.int32]
     parameters: list[CellParameters]
     pixels: int
+    layers: int
+    seed: NDArray[np.int64]
+    converged: NDArray[np.int8]
+    area_ratio: NDArray[np.float64]
+    width_ratio: NDArray[np.float64]
 
     def rows(self, *splits: str) -> list[int]:
         """Samples of some splits, in order."""
         return [row for row, split in enumerate(self.split) if split in splits]
+
+    @property
+    def threshold(self) -> float:
+        """Density per pixel above which there is tissue."""
+        return density_threshold(self.layers, self.pixels)
 
 
 def read_table(path: Path) -> StackTable:
@@ -195,11 +214,6 @@ def read_table(path: Path) -> StackTable:
     """
     with open_file(path) as file:
         try:
-            if "seed" not in file.variables:
-                raise RaptorError(
-                    f"{path} was made by an earlier version; delete it and run the workflow again, which "
-                    "keeps the simulations"
-                )
             columns = [file[name][:] for name in PARAMETERS]
             return StackTable(
                 file["simulation"][:],
@@ -208,6 +222,8 @@ def read_table(path: Path) -> StackTable:
                 file["n_cells"][:],
                 [CellParameters(*(float(v) for v in row)) for row in zip(*columns, strict=True)],
                 file.dimensions["x"].size,
+                int(file.layers),
+                *(file[name][:] for name in ("seed", "converged", "area_ratio", "width_ratio")),
             )
         except (IndexError, KeyError) as error:
             raise RaptorError(f"{path} is not a field stack: {error}") from error
@@ -228,4 +244,13 @@ def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
                 str(file["split"][row]),
                 int(file["n_cells"][row]),
                 bool(file["converged"][row]),
+                float(file["area_ratio"][row]),
+                float(file["width_ratio"][row]),
             )
+
+
+def read_masks(path: Path) -> Iterator[NDArray[np.uint8]]:
+    """Depression and tethers (2, y, x) of each sample, one at a time."""
+    with open_file(path) as file:
+        for row in range(file.dimensions["sample"].size):
+            yield np.stack([file["depression"][row], file["tethers"][row]])

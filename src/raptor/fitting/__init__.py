@@ -1,6 +1,5 @@
 """Fitting cell and matrix parameters to tissues: least squares, posteriors, outlines (docs/fits.md)."""
 
-from raptor.fitting.bound import simulate_at_delta
 from raptor.fitting.experimental_design import Sampled, rank_measurements, simulate_draws
 from raptor.fitting.joint import fit_joint
 from raptor.fitting.least_squares import Fit, Minimum, descend, fit, minimise
@@ -51,7 +50,6 @@ __all__ = [
     "read_outline",
     "recover",
     "seen",
-    "simulate_at_delta",
     "simulate_draws",
     "summarise",
     "surrogate_densities",

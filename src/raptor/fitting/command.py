@@ -15,7 +15,7 @@ from raptor.fields.shape import shape_ratios
 from raptor.fitting.fitted import FittedTissue
 from raptor.fitting.least_squares import Minimum, Residuals, minimise
 from raptor.fitting.outline import Densities, Outline, deviations, outline_measure, read_outline
-from raptor.fitting.posterior import infer, summarise, survey
+from raptor.fitting.posterior import RATIO_ERROR, infer, summarise, survey
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
 from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import (
@@ -37,9 +37,7 @@ from raptor.surrogate.inference import Surrogate
 By = Literal["surrogate", "simulator"]
 """What a fit asks."""
 
-STARTS = 128
-POINTS = 128  # of the survey behind intervals
-RATIO_ERROR, OUTLINE_ERROR = 0.01, 0.25
+OUTLINE_ERROR = 0.25
 LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
 CORRECTED = 4  # the part of simulations that correct the surrogate's fit is one over this
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval
@@ -238,7 +236,7 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
             for averaged in (False, True)
         )
         seed = request.simulator.seed
-        found = minimise(start_by, residuals, starts=STARTS, seed=seed, fine=measure)
+        found = minimise(start_by, residuals, seed=seed, fine=measure)
         if not request.by_simulator:
             return found, measure, surrogate_densities(request.surrogate, request.mould, averaged=True)
         return _corrected(request, found, measure)
@@ -268,8 +266,8 @@ def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
 
 def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:
     """The posterior in numbers."""
-    seen = survey(surrogate, request.mould, POINTS, request.simulator.seed)
-    return summarise(infer(seen, target, request.error or RATIO_ERROR, request.simulator.seed))
+    seen = survey(surrogate, request.mould, request.simulator.seed)
+    return summarise(infer(seen, target, request.simulator.seed, request.error or RATIO_ERROR))
 
 
 def _intervals(

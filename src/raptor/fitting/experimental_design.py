@@ -19,6 +19,7 @@ from raptor.fitting.simulator import Simulator
 from raptor.fitting.targets import PARAMETERS, Target, parameters_at
 from raptor.moulds.geometry import Mould
 
+DRAWS = 8  # simulations at draws from the posterior: the error of the surrogate there, and thickness
 DRAWN = 3000  # points that stand for the posterior
 TISSUES = 200  # hypothetical ones
 LEAST = 5  # simulations that a plane through thickness over the parameters needs
@@ -45,7 +46,7 @@ def simulate_draws(
     posterior: Posterior,
     simulator: Simulator,
     mould: Mould,
-    count: int,
+    count: int = DRAWS,
     on_progress: Callable[[str], None] = lambda note: None,
 ) -> Sampled:
     """Simulate a tissue at draws from its posterior, evenly along it."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fitting.least_squares import Minimum, Residuals, minimise
+from raptor.fitting.least_squares import STARTS, Minimum, Residuals, minimise
 from raptor.fitting.simulator import descend_by_simulation
 from raptor.fitting.targets import RATIOS, Measure, Target
 from raptor.parameters import CellParameters
@@ -19,9 +19,9 @@ def fit_joint(
     refined: Sequence[Measure],
     simulated: Sequence[Measure],
     *,
-    starts: int,
     seed: int,
     budget: int,
+    starts: int = STARTS,
 ) -> dict[str, Any]:
     """Fit tissues together by their surrogate's measures, and from there by those that simulate, as JSON.
 

@@ -17,6 +17,7 @@ from raptor.fitting.targets import Measure, Target, parameters_at
 from raptor.parameters import CellParameters
 
 STEP = 0.02  # of a finite difference, over a bound's width
+STARTS = 128  # points of the Sobol sequence among which a search chooses where to start
 REFINED = 4  # of the points that a search starts from
 MOST_STEPS = 30
 WITHIN = (1e-6, 1 - 1e-6)  # SciPy asks for a start within the bounds
@@ -137,7 +138,7 @@ class _Memory:
 
 
 def minimise(
-    measure: Measure, residuals: Residuals, *, starts: int, seed: int, fine: Measure | None = None
+    measure: Measure, residuals: Residuals, *, seed: int, starts: int = STARTS, fine: Measure | None = None
 ) -> Minimum:
     """Search the whole region, by a model that is cheap: from the best of many points that fill it.
 
@@ -208,7 +209,9 @@ def descend(
     return memory.best()
 
 
-def fit(measure: Measure, target: Target, *, starts: int, seed: int, fine: Measure | None = None) -> Fit:
+def fit(
+    measure: Measure, target: Target, *, seed: int, starts: int = STARTS, fine: Measure | None = None
+) -> Fit:
     """Fit the parameters to one tissue, as `minimise`."""
     return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed, fine=fine))
 

@@ -34,6 +34,8 @@ from raptor.surrogate.bands import LEVELS
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
+POINTS = 128  # of the Sobol sequence, at which the surrogate surveys the parameters
+RATIO_ERROR = 0.01  # standard error of a measured area or width ratio
 DENSE = 2**16  # points of the posterior
 BANDED = 32  # points of a survey at which bands are found
 TOGETHER = 32  # predictions at a time
@@ -106,7 +108,7 @@ class Posterior:
         return np.asarray(order[np.minimum(found, len(order) - 1)])
 
 
-def survey(surrogate: "Surrogate", mould: Mould, points: int, seed: int) -> Survey:
+def survey(surrogate: "Surrogate", mould: Mould, seed: int, points: int = POINTS) -> Survey:
     """Ask the surrogate about a mould's tissue at points (a power of two) that fill the region.
 
     Predictions are means over the images of D4, as those that bands were calibrated on; bands are found at
@@ -132,7 +134,9 @@ def survey(surrogate: "Surrogate", mould: Mould, points: int, seed: int) -> Surv
     return Survey(units, found, np.array(bands, dtype=float) / norm.ppf(0.975))
 
 
-def infer(found: Survey, target: Target, error: float, seed: int, dense: int = DENSE) -> Posterior:
+def infer(
+    found: Survey, target: Target, seed: int, error: float = RATIO_ERROR, dense: int = DENSE
+) -> Posterior:
     """Weigh the region by what was measured with a standard error.
 
     Raises

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.fields.shape import shape_ratios
-from raptor.fitting.least_squares import minimise
+from raptor.fitting.least_squares import STARTS, minimise
 from raptor.fitting.outline import deviations, outline_measure, outline_of
 from raptor.fitting.targets import PARAMETERS, Target, as_array, surrogate_densities, surrogate_measure
 from raptor.moulds.geometry import Mould
@@ -28,8 +28,8 @@ def recover(
     density: NDArray[np.floating],
     truth: CellParameters,
     *,
-    starts: int,
     seed: int,
+    starts: int = STARTS,
 ) -> dict[str, Any]:
     """Fit a tissue of known parameters from its density (y, x): by two ratios, and by its outline.
 

@@ -23,6 +23,7 @@ from raptor.raster import rasterise
 
 STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
 RESTART = 5  # evaluations left, with which another start can make a step
+REPEATS = 4  # simulations again at a fit, with further seeds
 ENOUGH = 1e-5  # residual sum of squares that noise of 0.003 from seed to seed leaves anyway
 
 
@@ -48,9 +49,8 @@ class Simulator:
 
     @classmethod
     def configured(cls, content: Mapping[str, Any]) -> "Simulator":
-        """From a configuration's block `model`, accuracy, pixels and seed."""
-        block = content["model"]
-        model = NetworkModel(block["layers"], tuple(block["shells"]), block["tension"])
+        """From a configuration's layers, shells, tension, accuracy, pixels and seed."""
+        model = NetworkModel(content["layers"], tuple(content["shells"]), content["tension"])
         return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
 
     def seed_of(self, further: int) -> int:

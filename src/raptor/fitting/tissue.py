@@ -6,14 +6,16 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from raptor.condor.simulate import Tissue
-from raptor.fitting.least_squares import Fit, minimise
-from raptor.fitting.simulator import ENOUGH, Simulator, measure_again
+from raptor.fitting.least_squares import STARTS, Fit, minimise
+from raptor.fitting.simulator import ENOUGH, REPEATS, Simulator, measure_again
 from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import Target, surrogate_measure
 from raptor.moulds.geometry import Mould
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
+
+CORRECTIONS = 6  # simulations: what is not mended by then was not mended by more (docs/fits.md)
 
 
 def fit_tissue(
@@ -22,9 +24,9 @@ def fit_tissue(
     mould: Mould,
     target: Target,
     *,
-    starts: int,
-    corrections: int,
-    repeats: int,
+    starts: int = STARTS,
+    corrections: int = CORRECTIONS,
+    repeats: int = REPEATS,
 ) -> tuple[Mapping[str, Any], Tissue]:
     """Both fits as JSON holds them, and the first simulation, with a further seed, at the surrogate's.
 

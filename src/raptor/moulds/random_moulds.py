@@ -6,13 +6,13 @@ cells, and filled with small round tethers placed by the same symmetry. What can
 (a piece cut off, a neck too narrow, a reach out of the image) is drawn again.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import shapely
 from numpy.random import Generator
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
+from raptor.core.blocks import Block, Positive
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds.geometry import Circle, Mould
@@ -21,6 +21,11 @@ from raptor.symmetry import Element
 SMOOTH_CORNERS = 96  # corners that draw a smooth outline
 MAX_ASPECT = 2.6
 ATTEMPTS = 2000
+TETHER_RADIUS = (0.8, 1.5)  # l0, equal within a mould: posts of the experiments are thin beside the tissue
+ARM_WIDTH = 4.0  # l0, narrowest neck and gap between tethers: a few cells, so that tissue can pass
+MARGIN = 3.0  # l0, rim of the image that stays free: more than 3 sigma of the raster
+SYMMETRY = {"none": 0.18, "mirror": 0.30, "half_turn": 0.22, "mirrors": 0.24, "square": 0.06}
+"""Share of each symmetry class: 4.06 distinct images a mould under D4, as in the paper (4.05)."""
 
 _MIRROR_Y = Element(quarter_turns=2, mirror=True)  # y -> -y
 _MIRROR_X = Element(quarter_turns=0, mirror=True)  # x -> -x
@@ -35,77 +40,66 @@ GROUPS: dict[str, tuple[Element, ...]] = {
 """The elements of D4 that leave a mould of each symmetry class unchanged."""
 
 
-@dataclass(frozen=True)
-class RandomMoulds:
-    """What random moulds are drawn from. Lengths in l0.
+class RandomMoulds(Block):
+    """What random moulds are drawn from."""
 
-    Parameters
-    ----------
-    cells : tuple of int
-        Bounds of the number of cells.
-    layers : int
-        Cell layers, which turn a number of cells into an area.
-    tethers : tuple of int
-        Bounds of the number of tethers.
-    tether_radius : tuple of float
-        Bounds of their radius, equal within a mould.
-    arm_width : float
-        The narrowest neck allowed, between walls and between tethers.
-    margin : float
-        Free rim of the image.
-    symmetry : dict
-        Weight of each symmetry class.
-    """
+    cells: tuple[Positive, Positive] = Field((500, 3000), description="bounds of the number of cells")
+    tethers: tuple[int, int] = Field((2, 16), description="bounds of the number of tethers")
 
-    cells: tuple[int, int]
-    layers: int
-    tethers: tuple[int, int]
-    tether_radius: tuple[float, float]
-    arm_width: float
-    margin: float
-    symmetry: dict[str, float]
+    @model_validator(mode="after")
+    def _ascending(self) -> "RandomMoulds":
+        for name, least in (("cells", 1), ("tethers", 0)):
+            low, high = getattr(self, name)
+            if not least <= low <= high:
+                raise ValueError(f"{name} is [{low}, {high}]; an ascending range from {least} is needed")
+        return self
 
-    def draw(self, rng: Generator, name: str) -> Mould:
+    def draw(self, rng: Generator, layers: int, name: str, symmetry: str | None = None) -> Mould:
         """Draw one mould; the same generator state gives the same mould.
+
+        Parameters
+        ----------
+        layers : int
+            Cell layers, which turn a number of cells into an area.
+        symmetry : str, optional
+            A key of `GROUPS`; drawn by `SYMMETRY` where it is not given.
 
         Raises
         ------
         RaptorError
             Where no mould that meets all bounds was found in many attempts.
         """
-        classes = sorted(self.symmetry)
-        weights = np.array([self.symmetry[c] for c in classes])
-        symmetry = str(rng.choice(classes, p=weights / weights.sum()))
+        drawn = str(rng.choice(list(SYMMETRY), p=list(SYMMETRY.values())))
         for _ in range(ATTEMPTS):
-            mould = self._attempt(rng, symmetry, name)
+            mould = self._attempt(rng, symmetry or drawn, layers, name)
             if mould is not None:
                 turned = Element(int(rng.integers(2)), mirror=False)  # a mirror may have either axis
                 return mould.transformed(turned.matrix)
         raise RaptorError(
-            f"no mould with {self.cells[0]} to {self.cells[1]} cells in {self.layers} layers, "
-            f"{self.tethers[0]} to {self.tethers[1]} tethers and arms of {self.arm_width} l0 was "
-            f"found in {ATTEMPTS} attempts; widen the bounds under 'moulds'"
+            f"no mould with {self.cells[0]} to {self.cells[1]} cells in {layers} layers, "
+            f"{self.tethers[0]} to {self.tethers[1]} tethers and arms of {ARM_WIDTH} l0 was "
+            f"found in {ATTEMPTS} attempts; widen the bounds under 'random_moulds'"
         )
 
-    def _attempt(self, rng: Generator, symmetry: str, name: str) -> Mould | None:
+    def _attempt(self, rng: Generator, symmetry: str, layers: int, name: str) -> Mould | None:
         outline = _random_outline(rng, symmetry)
-        radius = rng.uniform(*self.tether_radius)
+        radius = rng.uniform(*TETHER_RADIUS)
         count = int(rng.integers(self.tethers[0], self.tethers[1] + 1))
         # Cells per area of one layer is 1 / l0^2.
-        area = rng.uniform(*self.cells) / self.layers + count * np.pi * radius**2
+        area = rng.uniform(*self.cells) / layers + count * np.pi * radius**2
         outline = _scaled(outline, np.sqrt(area / outline.area))
-        if max(map(abs, outline.bounds)) > IMAGE_SIZE / 2 - self.margin:
+        if max(map(abs, outline.bounds)) > IMAGE_SIZE / 2 - MARGIN:
             return None
-        if not _wide_enough(outline, self.arm_width):
+        if not _wide_enough(outline, ARM_WIDTH):
             return None
         tethers = self._place_tethers(rng, outline, symmetry, count, radius)
         if tethers is None:
             return None
         mould = Mould(outline, tethers, symmetry, name)
-        cells = self.layers * mould.depression.area  # close to the count of sites
+        cells = layers * mould.depression.area  # close to the count of sites
         if not self.cells[0] * 1.02 <= cells <= self.cells[1] * 0.98:
             return None
-        if mould.depression.buffer(-self.arm_width / 3).geom_type != "Polygon":
+        if mould.depression.buffer(-ARM_WIDTH / 3).geom_type != "Polygon":
             return None  # tethers cut it in pieces
         return mould
 
@@ -113,8 +107,8 @@ class RandomMoulds:
         self, rng: Generator, outline: shapely.Polygon, symmetry: str, count: int, radius: float
     ) -> tuple[Circle, ...] | None:
         """Place about `count` tethers, with their images, at least an arm apart; None if crowded."""
-        room = outline.buffer(-(radius + self.arm_width / 2))
-        rim = room.difference(outline.buffer(-(radius + 2.5 * self.arm_width)))
+        room = outline.buffer(-(radius + ARM_WIDTH / 2))
+        rim = room.difference(outline.buffer(-(radius + 2.5 * ARM_WIDTH)))
         if room.is_empty or count == 0:
             return () if count == 0 else None
         placed: list[Circle] = []
@@ -128,7 +122,7 @@ class RandomMoulds:
                 continue
             if not all(shapely.contains_xy(room, post.x, post.y) for post in orbit):
                 continue  # moved out when it was put on an axis
-            if _apart(placed + orbit, 2 * radius + self.arm_width):
+            if _apart(placed + orbit, 2 * radius + ARM_WIDTH):
                 placed += orbit
         return tuple(placed) if self.tethers[0] <= len(placed) <= self.tethers[1] else None
 

@@ -49,6 +49,19 @@ def as_mould(mould: Mould | str | Path) -> Mould:
     )
 
 
+def read_at_scale(path: str | Path, mould_scale: float) -> Mould:
+    """Read a mould; a standard one at a scale, since people draw their own at the size that they cast.
+
+    Raises
+    ------
+    RaptorError
+        As `read_mould`.
+    """
+    path = find_mould(path)
+    mould = read_mould(path)
+    return mould.scaled(mould_scale) if path in MOULDS.values() else mould
+
+
 def read_mould(
     path: str | Path, scale: float | None = None, mm_per_l0: float | None = None, page: int | None = None
 ) -> Mould:

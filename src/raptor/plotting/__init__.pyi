@@ -9,14 +9,13 @@ from .drawing import (
     new_figure,
     require_picture,
     save,
-    save_fields,
     save_picture,
     show_field,
     tradeoff_figure,
 )
 from .evaluation import (
+    active_learning_figure,
     calibration_figure,
-    enrichment_figure,
     models_figure,
     regions_figure,
     training_figure,
@@ -24,16 +23,16 @@ from .evaluation import (
 )
 from .fits import fit_figure, valley_figure
 from .front import plot
-from .sweep import contraction_figure, directors_figure, panels_figure, save_panels
+from .sweep import contraction_figure, directors_figure, panels_figure
 
 __all__ = [
+    "active_learning_figure",
     "bulk_figure",
     "calibration_figure",
     "contraction_figure",
     "design_figure",
     "directors_figure",
     "draw_mould",
-    "enrichment_figure",
     "fields_figure",
     "fit_figure",
     "folding_figure",
@@ -45,8 +44,6 @@ __all__ = [
     "regions_figure",
     "require_picture",
     "save",
-    "save_fields",
-    "save_panels",
     "save_picture",
     "show_field",
     "tradeoff_figure",

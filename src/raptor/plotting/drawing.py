@@ -213,7 +213,7 @@ def design_figure(table: "pd.DataFrame", moulds: Sequence[Mould]) -> Figure:
     figure = new_figure(12.0, 4.8)
     top, bottom = cast(Any, figure.subfigures(2, 1, height_ratios=[1.8, 1]))
     panels = top.subplots(1, 5)
-    edge = table["edge"].astype(bool)
+    edge = table["edge"].astype(bool) if "edge" in table else table["delta"] < 0
     panels[0].hist(
         [table["delta"][~edge], table["delta"][edge]], bins=18, range=(0.05, 0.95), stacked=True,
         color=[SIMULATED, PREDICTED], label=["drawn", "at an end"],
@@ -304,19 +304,3 @@ def _method_colour(method: str) -> str:
     """Colour of a method's family."""
     families = {"anneal": "#8a3355", "draft": "#b8860b", "standard": SIMULATED, "reference": "#3c8a5a"}
     return next((colour for name, colour in families.items() if method.startswith(name)), PREDICTED)
-
-
-def save_fields(path: Path, stacks: Mapping[str, NDArray[np.floating]]) -> None:
-    """Write the field stacks (8, y, x) that a figure draws, by name, as netCDF."""
-    import xarray as xr
-
-    data = xr.Dataset(
-        {
-            name: (("field", "y", "x"), stack.astype(np.float32), {"long_name": name, "units": "1"})
-            for name, stack in stacks.items()
-        },
-        coords={"field": list(FIELDS)},
-        attrs={"title": "Fields of a figure, per pixel", "Conventions": "CF-1.11"},
-    )
-    with atomic_path(path) as temporary:
-        data.to_netcdf(temporary)

@@ -120,7 +120,7 @@ def regions_figure(metrics: pd.DataFrame, regions: pd.DataFrame) -> Figure:
 
 
 @STYLED
-def enrichment_figure(regions: pd.DataFrame) -> Figure:
+def active_learning_figure(regions: pd.DataFrame) -> Figure:
     """Errors by region of models trained without and with further simulations, a bar a model."""
     figure = new_figure(12.0, 4.6)
     panels = figure.subplots(1, 3, sharey=True)

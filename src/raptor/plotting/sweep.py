@@ -1,23 +1,20 @@
 """Figures of sweeps: contraction curves, densities and directors over the parameters."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from raptor.core.files import atomic_path
 from raptor.fields.directors import Directors, directors
 from raptor.moulds.geometry import Mould
 from raptor.plotting.drawing import STYLED, draw_mould, new_figure, show_field
-from raptor.studies.sweep import POINT, Tissue
+from raptor.studies.sweep import Panel
 
 LINES, MARKERS = ("-", "--", ":", "-."), ("o", "s", "^", "D")
 MEASURE_LABELS = {
@@ -25,7 +22,6 @@ MEASURE_LABELS = {
     "area": r"decrease of the area, $100\,(1 - A/A_0)$ (%)",
 }
 RATIO = r"$\kappa_{NNNN}/\kappa_{NNN}$"
-SOURCES = ("simulated", "predicted")
 APART = 0.006  # of Delta, by which points of one Delta are drawn beside each other
 RIM = 1.5  # l0 shown about a mould
 
@@ -40,7 +36,7 @@ def ordered_colours(values: Sequence[float]) -> dict[float, Any]:
 def contraction_figure(table: pd.DataFrame) -> Figure:
     """Contraction against Delta: simulations as points with error bars, predictions as lines with bands.
 
-    `table` is that of `sweeps.compare`, of one or several moulds.
+    `table` is that of `sweep.contraction`, of one or several moulds.
     """
     moulds = list(dict.fromkeys(table["mould"]))
     colours = ordered_colours(sorted(set(table["kappa_nnn"])))
@@ -59,7 +55,7 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
                 axes.set_ylabel(MEASURE_LABELS[measure])
         grid[0, column].set_title(str(mould).replace("_", " ").capitalize())
         grid[1, column].set_xlabel(r"cell-matrix interaction $\Delta$")
-    _legend(figure, colours, ratios)
+    _legend(figure, colours, ratios, predicted=bool(table["predicted"].notna().any()))
     return figure
 
 
@@ -75,7 +71,9 @@ def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int, apart: floa
     )  # fmt: skip
 
 
-def _legend(figure: Figure, colours: Mapping[float, Any], ratios: Sequence[float]) -> None:
+def _legend(
+    figure: Figure, colours: Mapping[float, Any], ratios: Sequence[float], *, predicted: bool
+) -> None:
     """Colours of kappa_nnn, line styles of the ratio, and what points and lines are."""
     handles = [
         Line2D([], [], color=colour, lw=3, label=rf"$\kappa_{{NNN}}/\kappa_0$ = {kappa:g}")
@@ -87,35 +85,38 @@ def _legend(figure: Figure, colours: Mapping[float, Any], ratios: Sequence[float
         handles.append(Line2D([], [], color="black", ms=4, label=label, **cast(Any, style)))
     point: Any = {"ls": "", "marker": "o", "mfc": "white", "color": "black", "ms": 4}
     handles.append(Line2D([], [], label="simulated (bar: deviation over seeds)", **point))
-    handles.append(Line2D([], [], color="black", label="predicted (shade: 95 % band)"))
+    if predicted:
+        handles.append(Line2D([], [], color="black", label="predicted (shade: 95 % band)"))
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
 
 
 @STYLED
-def panels_figure(tissues: Sequence[Tissue], mould: Mould) -> Figure:
+def panels_figure(panels: Sequence[Panel], mould: Mould) -> Figure:
     """The paper's density panels: simulated over predicted, a block a Delta, on one scale."""
-    deltas, kappas, ratios = (sorted({t.point[axis] for t in tissues}) for axis in range(3))
-    limit = max(float(np.percentile(t.simulated[0], 99.8)) for t in tissues)
+    deltas, kappas, ratios = (sorted({p.point[axis] for p in panels}) for axis in range(3))
+    sources = list(panels[0].sources)
+    limit = max(float(np.percentile(p.sources["simulated"][0], 99.8)) for p in panels)
     x0, y0, x1, y1 = mould.outline.bounds
     shape = (y1 - y0 + 2 * RIM) / (x1 - x0 + 2 * RIM)
     widths = [2.2 * len(kappas) + 0.3] * len(deltas) + [0.9]
-    figure = new_figure(sum(widths), 0.8 + 2 * len(ratios) * (2.0 * shape + 0.15))
+    rows = len(sources) * len(ratios)
+    figure = new_figure(sum(widths), 0.8 + rows * (2.0 * shape + 0.15))
     shown: Any = None
     *blocks, margin = cast(Any, figure.subfigures(1, len(widths), width_ratios=widths))
     for delta, block in zip(deltas, blocks, strict=True):
-        grid = block.subplots(2 * len(ratios), len(kappas), squeeze=False)
+        grid = block.subplots(rows, len(kappas), squeeze=False)
         block.suptitle(rf"$\Delta$ = {delta:g}")
-        of_block = {tissue.point[1:]: tissue for tissue in tissues if tissue.point[0] == delta}
+        of_block = {panel.point[1:]: panel for panel in panels if panel.point[0] == delta}
         for row, column in np.ndindex(len(ratios), len(kappas)):
-            pair = grid[2 * row : 2 * row + 2, column]
-            tissue = of_block.get((kappas[column], ratios[row]))
-            for axes, source in zip(pair, SOURCES, strict=True):
-                density = None if tissue is None else tissue.sources[source][0]
+            stacked = grid[len(sources) * row : len(sources) * (row + 1), column]
+            panel = of_block.get((kappas[column], ratios[row]))
+            for axes, source in zip(stacked, sources, strict=True):
+                density = None if panel is None else panel.sources[source][0]
                 shown = _panel(axes, density, mould, limit) or shown
             if row == 0:
-                pair[0].set_title(rf"$\kappa_{{NNN}}$ = {kappas[column]:g}", fontsize=8)
+                stacked[0].set_title(rf"$\kappa_{{NNN}}$ = {kappas[column]:g}", fontsize=8)
             if column == 0:
-                for axes, source in zip(pair, SOURCES, strict=True):
+                for axes, source in zip(stacked, sources, strict=True):
                     axes.set_ylabel(f"{RATIO} = {ratios[row]:g}\n{source}", fontsize=7)
     margin.colorbar(shown, cax=margin.add_axes((0.05, 0.25, 0.2, 0.5)), label="density per pixel")
     return figure
@@ -131,23 +132,24 @@ def _panel(axes: Axes, density: NDArray[np.floating] | None, mould: Mould, limit
 
 
 @STYLED
-def directors_figure(rows: Sequence[tuple[Tissue, Mould]], threshold: float) -> Figure:
+def directors_figure(rows: Sequence[tuple[Panel, Mould]], thresholds: Mapping[str, float]) -> Figure:
     """Directors over density, a row a tissue: simulated left, predicted right; length by anisotropy.
 
-    Directors are drawn where density per pixel is above `threshold`.
+    Directors are drawn where density per pixel is above the threshold of their source.
     """
-    figure = new_figure(10.5, 0.5 + 2.9 * len(rows))
-    grid = cast(Any, figure.subplots(len(rows), 2, squeeze=False))
-    limit = max(float(np.percentile(tissue.simulated[0], 99.8)) for tissue, _ in rows)
-    for pair, (tissue, mould) in zip(grid, rows, strict=True):
-        for axes, (source, fields) in zip(pair, tissue.sources.items(), strict=True):
+    sources = list(rows[0][0].sources)
+    figure = new_figure(5.25 * len(sources), 0.5 + 2.9 * len(rows))
+    grid = cast(Any, figure.subplots(len(rows), len(sources), squeeze=False))
+    limit = max(float(np.percentile(panel.sources["simulated"][0], 99.8)) for panel, _ in rows)
+    for row, (panel, mould) in zip(grid, rows, strict=True):
+        for axes, (source, fields) in zip(row, panel.sources.items(), strict=True):
             shown = _panel(axes, fields[0], mould, limit)
-            found = directors(fields, threshold)
+            found = directors(fields, thresholds[source])
             draw_directors(axes, found)
             axes.set_title(f"{source}, mean anisotropy {np.nanmean(found.anisotropy):.2f}", fontsize=8)
-        delta, kappa, ratio = tissue.point
+        delta, kappa, ratio = panel.point
         values = rf"$\Delta$ = {delta:g}, $\kappa_{{NNN}}$ = {kappa:g}, {RATIO} = {ratio:g}"
-        pair[0].set_ylabel(f"{mould.name.replace('_', ' ').capitalize()}\n{values}", fontsize=7)
+        row[0].set_ylabel(f"{mould.name.replace('_', ' ').capitalize()}\n{values}", fontsize=7)
     figure.colorbar(shown, ax=grid, shrink=0.5, label="density per pixel")
     return figure
 
@@ -164,20 +166,3 @@ def draw_directors(axes: Axes, found: Directors) -> None:
         x, y, across, up, angles="xy", scale_units="xy", scale=1, color="white", edgecolor="black",
         linewidth=0.35, width=0.0035, zorder=0.9, **plain,
     )  # fmt: skip
-
-
-def save_panels(path: Path, tissues: Sequence[Tissue]) -> None:
-    """Write the densities that panels draw as netCDF, per pixel, by source and point of the sweep."""
-    densities = np.array([[tissue.sources[source][0] for source in SOURCES] for tissue in tissues])
-    attributes = {"long_name": "density per pixel", "units": "1"}
-    coordinates: dict[str, Any] = {"source": list(SOURCES)}
-    for axis, name in enumerate(POINT):
-        values = [tissue.point[axis] for tissue in tissues]
-        coordinates[name] = ("tissue", values, {"long_name": name, "units": "1"})
-    data = xr.Dataset(
-        {"density": (("tissue", "source", "y", "x"), densities, attributes)},
-        coords=coordinates,
-        attrs={"title": "Densities of a sweep", "Conventions": "CF-1.11"},
-    )
-    with atomic_path(path) as temporary:
-        data.to_netcdf(temporary, encoding={"density": {"zlib": True, "complevel": 1}})

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from raptor.dataset.netcdf import create, variable
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
+from raptor.parameters import PARAMETERS
 from raptor.surrogate.bands import LEVELS
 from raptor.surrogate.prediction import Prediction
 from raptor.symmetry import FIELDS
@@ -146,18 +148,18 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
     }
 
 
-def noise_floor(stack: Path, further: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:
+def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:
     """Seed-to-seed noise of each mould that was simulated again, one row each, under `evaluate`'s names.
 
     Every pair of runs is compared as a prediction with its target would be; errors over sqrt 2 are those of
     the best prediction possible, the mean of very many runs. Of measures the standard deviation.
     """
-    table, again = read_table(stack), read_table(further)
+    table, again = read_table(stack), read_table(repeats)
     rows = []
     for mould in dict.fromkeys(again.mould):
         first = [number for number, name in enumerate(table.mould) if name == mould]
         others = [number for number, name in enumerate(again.mould) if name == mould]
-        samples = [*read_samples(stack, first), *read_samples(further, others)]
+        samples = [*read_samples(stack, first), *read_samples(repeats, others)]
         pairs = [field_errors(a.fields, b.fields, b) for a, b in combinations(samples, 2)]
         row: dict[str, Any] = {"simulation": samples[0].simulation, "mould": mould, "runs": len(samples)}
         row |= asdict(samples[0].parameters)
@@ -225,13 +227,44 @@ def by_region(metrics: pd.DataFrame) -> pd.DataFrame:
 
 
 def regions_of(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Errors by region on the test split, then on each further set, of one model's tables by set."""
-    further = [
-        by_region(table).head(1).assign(region=f"further: {name}")
-        for name, table in tables.items()
-        if name != "test"
-    ]
-    return pd.concat([by_region(tables["test"]), *further], ignore_index=True)
+    """Errors of a model by region on the first campaign, then on each other one as a whole."""
+    first, *others = tables.items()
+    wholes = [by_region(table).head(1).assign(region=f"campaign: {name}") for name, table in others]
+    return pd.concat([by_region(first[1]), *wholes], ignore_index=True)
+
+
+def median_and_worst(metrics: pd.DataFrame) -> list[int]:
+    """Simulations to be drawn: the one whose error of density is the median, then the worst."""
+    ordered = metrics.sort_values("vrmse_density")["simulation"].tolist()
+    return [ordered[len(ordered) // 2], *worst(metrics)["simulation"].tolist()]
+
+
+def predict_samples(
+    path: Path, surrogate: "Surrogate", stack: Path, moulds: Mapping[str, Mould], chosen: pd.DataFrame
+) -> None:
+    """Write fields of samples of a stack, simulated and predicted, as netCDF.
+
+    Parameters
+    ----------
+    chosen : DataFrame
+        Rows of `evaluate` by simulation, in the order in which samples are written.
+    """
+    table, along = read_table(stack), ("sample", "field", "y", "x")
+    row_of = {simulation: row for row, simulation in enumerate(table.simulation.tolist())}
+    samples = list(read_samples(stack, [row_of[simulation] for simulation in chosen.index]))
+    predicted = [surrogate.predict(moulds[s.mould], [s.parameters])[0] for s in samples]
+    with create(path, "Held-out samples, simulated and predicted", "prediction") as file:
+        sizes = (len(samples), len(FIELDS), table.pixels, table.pixels)
+        for name, size in zip(along, sizes, strict=True):
+            file.createDimension(name, size)
+        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
+        variable(file, "simulation", ("sample",), chosen.index.to_numpy(), "simulation id")
+        variable(file, "mould", ("sample",), chosen["mould"].to_numpy(), "mould id")
+        for name, text in (PARAMETERS | {"vrmse_density": "VRMSE of density"}).items():
+            variable(file, name, ("sample",), chosen[name].to_numpy(), text)
+        simulated = np.array([sample.fields for sample in samples])
+        variable(file, "simulated", along, simulated, "simulated fields, per pixel")
+        variable(file, "predicted", along, np.array(predicted), "predicted fields, per pixel")
 
 
 def worst(metrics: pd.DataFrame, count: int = 12) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """Contraction over a grid of parameters: what was simulated, what is predicted, and how far they differ."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,139 +11,125 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
-from raptor.dataset.shards import Record, read_shard
-from raptor.dataset.stack import record_fields
-from raptor.dataset.sweep import Grid
-from raptor.fields.shape import shape_ratios
-from raptor.moulds.cast import CastMould
+from raptor.dataset.netcdf import create, open_file, variable
+from raptor.dataset.stack import read_samples, read_table
 from raptor.moulds.geometry import Mould
-from raptor.parameters import CellParameters
+from raptor.parameters import PARAMETERS, CellParameters
 from raptor.surrogate.bands import LEVELS
+from raptor.symmetry import FIELDS
 
-if TYPE_CHECKING:  # tables and figures do not wait for torch
+if TYPE_CHECKING:
     from raptor.surrogate.inference import Surrogate
 
-POINT = ["delta", "kappa_nnn", "ratio"]
+POINT = ["mould", "delta", "kappa_nnn", "ratio"]
 SHAPES = ("area_ratio", "width_ratio")
 MEASURES = {"width": "width_ratio", "area": "area_ratio"}
 """Percentage decreases, and the ratio that each follows from."""
-
 Point = tuple[float, float, float]
 """Delta, kappa_nnn, kappa_nnnn / kappa_nnn."""
+SHOWN = (0.5, 0.9)
+"""Values of delta of which tissues are drawn, as in the paper, or those nearest to them."""
 
 
-def point_of(parameters: CellParameters) -> Point:
-    """The point of a grid at which parameters stand."""
-    ratio = round(parameters.kappa_nnnn / parameters.kappa_nnn, 9)
-    return parameters.delta, parameters.kappa_nnn, ratio
+def ratio_of(parameters: CellParameters) -> float:
+    """kappa_nnnn / kappa_nnn."""
+    return round(parameters.kappa_nnnn / parameters.kappa_nnn, 9)
 
 
-def _records(shards: Iterable[Path], configuration: str | None) -> Iterable[Record]:
-    """The simulations of shards, one shard in memory at a time."""
-    for path in shards:
-        yield from read_shard(path, configuration).records
-
-
-def measure(
-    shards: Iterable[Path],
-    mould: Mould,
-    layers: int,
-    pixels: int,
-    configuration: str | None = None,
-    on_progress: Callable[[int], None] = lambda simulation: None,
-) -> pd.DataFrame:
-    """A/A0 and w/w0 of every simulation of a sweep, one row each; those that failed have none.
+def tabulate(stack: Path) -> pd.DataFrame:
+    """A/A0 and w/w0 of every simulation of a campaign's stack, one row each; those that failed have none.
 
     Raises
     ------
     RaptorError
-        As `read_shard`.
+        Where the file is missing or is no stack.
     """
-    rows = []
-    cast = CastMould(mould, layers, pixels)
-    for record in _records(shards, configuration):
-        shape = shape_ratios(record_fields(record, pixels)[0], cast).tolist()
-        row: dict[str, Any] = {"simulation": record.simulation, "seed": record.seed}
-        row |= dict(zip(POINT, point_of(record.parameters), strict=True))
-        row |= dict(zip(SHAPES, shape, strict=True))
-        row |= {"converged": record.converged, "inverted_fraction": record.inverted_fraction}
-        rows.append(row)
-        on_progress(record.simulation)
-    columns = ["simulation", "seed", *POINT, *SHAPES, "converged", "inverted_fraction"]
-    return pd.DataFrame(rows, columns=columns)
+    table = read_table(stack)
+    columns: dict[str, Any] = {"simulation": table.simulation, "mould": table.mould}
+    columns |= {name: [getattr(p, name) for p in table.parameters] for name in PARAMETERS}
+    columns["ratio"] = [ratio_of(p) for p in table.parameters]
+    columns |= {"seed": table.seed, "n_cells": table.n_cells, "converged": table.converged.astype(bool)}
+    return pd.DataFrame(columns | {"area_ratio": table.area_ratio, "width_ratio": table.width_ratio})
 
 
 def predict(
     surrogate: "Surrogate",
-    mould: Mould,
-    grid: Grid,
-    on_progress: Callable[[Point], None] = lambda point: None,
-) -> pd.DataFrame:
-    """A/A0 and w/w0 at every point of a grid as the surrogate predicts them, with its 95 % bands.
+    runs: Sequence[Run],
+    moulds: Mapping[str, Mould],
+    on_progress: Callable[[str], None] = lambda point: None,
+) -> tuple[pd.DataFrame, dict[int, NDArray[np.float32]]]:
+    """A/A0 and w/w0, with their 95 % bands, at every point of a campaign, and fields (8, y, x) to be drawn.
+
+    Fields by row of the table, at the values of delta nearest to `SHOWN`.
 
     Raises
     ------
     RaptorError
         Where the surrogate is not calibrated.
     """
-    rows = []
-    widest = LEVELS.index(0.95)
-    cast = surrogate.cast(mould)
-    for parameters in grid.points.values():
-        point = point_of(parameters)
-        predicted = surrogate.examine(cast, parameters)
+    widest, shown = LEVELS.index(0.95), shown_deltas([run.parameters.delta for run in runs])
+    casts = {name: surrogate.cast(mould) for name, mould in moulds.items()}
+    rows: list[dict[str, Any]] = []
+    fields: dict[int, NDArray[np.float32]] = {}
+    for mould, parameters in dict.fromkeys((run.mould, run.parameters) for run in runs):
+        predicted = surrogate.examine(casts[mould], parameters)
+        point = (mould, parameters.delta, parameters.kappa_nnn, ratio_of(parameters))
         row: dict[str, Any] = dict(zip(POINT, point, strict=True))
         row |= dict(zip(SHAPES, predicted.ratios.tolist(), strict=True))
         bands = predicted.ratio_bands.half[widest].tolist()
         row |= {f"{name}_band95": band for name, band in zip(SHAPES, bands, strict=True)}
+        if parameters.delta in shown:
+            fields[len(rows)] = predicted.values
         rows.append(row | {"unlike": predicted.out_of_distribution})
-        on_progress(point)
-    return pd.DataFrame(rows)
+        on_progress(f"{mould}, {parameters}")
+    return pd.DataFrame(rows), fields
 
 
-def compare(mould: str, simulated: pd.DataFrame, predicted: pd.DataFrame) -> pd.DataFrame:
-    """Contraction in per cent, simulated and predicted: a row for each point of the grid and measure.
+def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) -> pd.DataFrame:
+    """Contraction in per cent, simulated and predicted: a row for each point and measure.
 
     Columns: `mould`, `measure` (width or area), the point, `simulated` (mean over seeds), `spread` (standard
     deviation over seeds, NaN of a single one), `seeds`, `predicted`, `band95`, `difference` (predicted less
-    simulated), `held` (whether the band holds the mean) and `unlike`, the surrogate's own warning.
+    simulated), `within_band` (whether the band holds the mean) and `unlike`, the surrogate's own warning.
+    Without a prediction the last ones are empty.
     """
+    if predicted is None:
+        nothing = dict.fromkeys((*SHAPES, *(f"{name}_band95" for name in SHAPES)), np.nan)
+        predicted = simulated[POINT].drop_duplicates().assign(**nothing, unlike=False)
+    there = predicted.set_index(POINT)
     tables = []
-    for measure_name, ratio in MEASURES.items():
+    for measure, ratio in MEASURES.items():
         of_point = (100 * (1 - simulated.set_index(POINT)[ratio])).groupby(level=POINT)
-        table = predicted[[*POINT, "unlike"]].set_index(POINT)
-        table["simulated"] = of_point.mean()
-        table["spread"] = of_point.std()
-        table["seeds"] = of_point.count().reindex(table.index, fill_value=0)
-        there = predicted.set_index(POINT)
+        table = pd.DataFrame({"measure": measure}, index=there.index)
+        table["simulated"], table["spread"] = of_point.mean(), of_point.std()
+        table["seeds"] = of_point.count().reindex(there.index, fill_value=0)
         table["predicted"] = 100 * (1 - there[ratio])
         table["band95"] = 100 * there[f"{ratio}_band95"]
         table["difference"] = table["predicted"] - table["simulated"]
-        table["held"] = table["difference"].abs() <= table["band95"]
-        tables.append(table.reset_index().assign(mould=mould, measure=measure_name))
+        table["within_band"] = table["difference"].abs() <= table["band95"]
+        table["unlike"] = there["unlike"]
+        tables.append(table.reset_index())
     joined = pd.concat(tables, ignore_index=True)
-    return joined.set_index(["mould", "measure", *POINT]).reset_index()
+    return joined.set_index(["mould", "measure"]).reset_index()
 
 
 def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """For each mould and measure of `compare`: the largest difference and where it is, and the means.
+    """For each mould and measure of `contraction`: the largest difference and where it is, and the means.
 
     Differences in percentage points; `spread` is the root mean variance over seeds.
     """
     found = []
-    for (mould, measure_name), part in table.groupby(["mould", "measure"], sort=False):
+    for (mould, measure), part in table.groupby(["mould", "measure"], sort=False):
         known = part.dropna(subset=["difference"])
-        entry: dict[str, Any] = {"mould": str(mould), "measure": str(measure_name), "points": len(known)}
+        entry: dict[str, Any] = {"mould": str(mould), "measure": str(measure), "points": len(known)}
         if len(known):
             worst = known.sort_values("difference", key=np.abs).iloc[-1]
-            entry["largest"] = {
-                name: float(worst[name])
-                for name in (*POINT, "simulated", "predicted", "band95", "difference")
-            }
+            shown = (*POINT[1:], "simulated", "predicted", "band95", "difference")
+            entry["largest"] = {name: float(worst[name]) for name in shown}
             entry["mean_absolute"] = float(known["difference"].abs().mean())
             entry["bias"] = float(known["difference"].mean())
             entry["spread"] = _finite(np.sqrt((known["spread"] ** 2).mean()))
-            entry["held"] = float(known["held"].mean())
+            entry["within_band"] = float(known["within_band"].mean())
             entry["unlike"] = float(known["unlike"].mean())
         found.append(entry)
     return found
@@ -154,55 +140,81 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def middle_points(grid: Grid, deltas: Sequence[float]) -> list[Point]:
-    """The points at some Deltas in the middle of a grid's spring constants."""
-    kappa, ratio = (values[len(values) // 2] for values in (grid.kappa_nnn, grid.ratios))
-    return [(delta, kappa, ratio) for delta in deltas]
+def shown_deltas(deltas: Sequence[float]) -> tuple[float, ...]:
+    """Those values of delta that are nearest to `SHOWN`."""
+    return tuple(sorted({min(deltas, key=lambda delta: abs(delta - wanted)) for wanted in SHOWN}))
 
 
 @dataclass(frozen=True)
-class Tissue:
-    """Fields (8, y, x) at one point of a sweep: of the first seed's simulation, and predicted."""
+class Panel:
+    """Fields (8, y, x) at one point of a sweep, by source: of the first seed's simulation, and predicted."""
 
+    mould: str
     point: Point
-    simulated: NDArray[np.float32]
-    predicted: NDArray[np.float32]
-
-    @property
-    def sources(self) -> dict[str, NDArray[np.float32]]:
-        """Both, by name."""
-        return {"simulated": self.simulated, "predicted": self.predicted}
+    sources: Mapping[str, NDArray[np.float32]]
 
 
-def tissues(
-    points: Sequence[Point],
-    shards: Iterable[Path],
-    runs: Sequence[Run],
-    mould: Mould,
-    surrogate: "Surrogate",
-    configuration: str | None = None,
-) -> list[Tissue]:
-    """Tissues at some points of a sweep, in the order of `points`; without those whose simulation failed.
+def write_predicted(
+    path: Path, table: pd.DataFrame, fields: Mapping[int, NDArray[np.float32]], threshold: float
+) -> None:
+    """Write predicted fields (8, y, x), by row of the table of their points, as netCDF."""
+    chosen = table.iloc[list(fields)]
+    stacks = np.array(list(fields.values()))
+    with create(path, "Fields of a sweep, predicted", "prediction") as file:
+        file.threshold = threshold  # density per pixel above which there is tissue
+        sizes = zip(("point", "field", "y", "x"), stacks.shape, strict=True)
+        for name, size in sizes:
+            file.createDimension(name, size)
+        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
+        for name in POINT:
+            variable(file, name, ("point",), chosen[name].to_numpy(), name)
+        variable(file, "fields", ("point", "field", "y", "x"), stacks, "fields, per pixel")
+
+
+def read_panels(
+    stack: Path, mould: str, predicted: Path | None = None
+) -> tuple[list[Panel], dict[str, float]]:
+    """Tissues of one mould to be drawn, without those whose simulation failed, and thresholds by source.
 
     Raises
     ------
     RaptorError
-        As `read_shard`, and where all of them failed.
+        Where all of them failed, or a file cannot be read.
     """
-    first: dict[Point, Run] = {}
-    for run in runs:
-        first.setdefault(point_of(run.parameters), run)
-    wanted = {first[point].simulation: point for point in points}
-    found = {}
-    cast = surrogate.cast(mould)
-    for record in _records(shards, configuration):
-        if record.simulation in wanted:
-            simulated = record_fields(record, surrogate.pixels)
-            predicted = surrogate.predict(cast, [record.parameters])[0]
-            point = wanted[record.simulation]
-            found[point] = Tissue(point, simulated, predicted)
-    if not found:
-        raise RaptorError(
-            f"every simulation of {mould.name} to be drawn failed; see the logs of simulate_sweep for why"
-        )
-    return [found[point] for point in points if point in found]
+    table = read_table(stack)
+    first: dict[Point, int] = {}
+    for row, parameters in enumerate(table.parameters):
+        if table.mould[row] == mould:
+            point = (parameters.delta, parameters.kappa_nnn, ratio_of(parameters))
+            first.setdefault(point, row)
+    if not first:
+        raise RaptorError(f"every simulation of {mould} failed; see the logs of simulate_shard for why")
+    shown = shown_deltas([point[0] for point in first])
+    chosen = {point: row for point, row in first.items() if point[0] in shown}
+    of_surrogate, thresholds = _read_predicted(predicted, mould) if predicted else ({}, {})
+    panels = []
+    for point, sample in zip(chosen, read_samples(stack, chosen.values()), strict=True):
+        sources = {"simulated": sample.fields}
+        if point in of_surrogate:
+            sources["predicted"] = of_surrogate[point]
+        panels.append(Panel(mould, point, sources))
+    return panels, thresholds | {"simulated": table.threshold}
+
+
+def _read_predicted(path: Path, mould: str) -> tuple[dict[Point, NDArray[np.float32]], dict[str, float]]:
+    """Predicted fields (8, y, x) of a mould, by point."""
+    with open_file(path) as file:
+        columns = zip(*(file[name][:] for name in POINT), strict=True)
+        found = {
+            (float(delta), float(kappa_nnn), float(ratio)): file["fields"][row]
+            for row, (name, delta, kappa_nnn, ratio) in enumerate(columns)
+            if str(name) == mould
+        }
+        return found, {"predicted": float(file.threshold)}
+
+
+def middle_points(panels: Sequence[Panel]) -> list[Panel]:
+    """The tissues in the middle of the spring constants, of each value of delta."""
+    kappas, ratios = (sorted({panel.point[axis] for panel in panels}) for axis in (1, 2))
+    middle = (kappas[len(kappas) // 2], ratios[len(ratios) // 2])
+    return [panel for panel in panels if panel.point[1:] == middle]

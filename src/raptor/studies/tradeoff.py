@@ -1,18 +1,21 @@
 """Speed against accuracy: what each way to a tissue's fields costs and gets wrong."""
 
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import pandas as pd
 import shapely
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, model_validator
 
-from raptor.condor.simulate import Tissue, simulate
+from raptor.condor.simulate import Tissue, accuracy_named, simulate
+from raptor.core.blocks import Block, Name
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
@@ -21,6 +24,93 @@ from raptor.raster import rasterise
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
+
+REFERENCES = 4  # runs of the reference, of different seeds, by which the spread is measured
+SURROGATE = "surrogate"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The `standard` run in another model or on another raster; what is None stays."""
+
+    layers: int | None = None
+    shells: tuple[int, int, int] | None = None
+    pixels: int | None = None
+
+
+def variant_named(method: str) -> Variant | None:
+    """The variant that a method's name states: "3 layers", "shells 1 2 4", "64 pixels"; None of any other.
+
+    Raises
+    ------
+    RaptorError
+        Where there is no such network of cells.
+    """
+    if found := re.fullmatch(r"([1-9]\d?) layers", method):
+        NetworkModel(int(found[1]))
+        return Variant(layers=int(found[1]))
+    if found := re.fullmatch(r"shells (\d) (\d) (\d)", method):
+        shells = (int(found[1]), int(found[2]), int(found[3]))
+        NetworkModel(1, shells)
+        return Variant(shells=shells)
+    if found := re.fullmatch(r"([1-9]\d{1,3}) pixels", method):
+        return Variant(pixels=int(found[1]))
+    return None
+
+
+def _method(name: str) -> str:
+    if name != SURROGATE and variant_named(name) is None:
+        accuracy_named(name)
+    return name
+
+
+class Case(Block):
+    """A mould and parameters to compare on."""
+
+    mould: str = Field(description="name of a mould of the library, or a mould file")
+    delta: float = Field(description="cell-matrix interaction")
+    kappa_nnn: float = Field(description="second spring constant, kappa0")
+    kappa_nnnn: float = Field(description="third spring constant, kappa0")
+    layers: int | None = Field(None, ge=1, le=64, description="where it is not layers")
+
+    @model_validator(mode="after")
+    def _allowed(self) -> "Case":
+        CellParameters(self.delta, self.kappa_nnn, self.kappa_nnnn)
+        return self
+
+
+CASES = {
+    "middle": Case(mould="small_rectangle", delta=0.5, kappa_nnn=0.5, kappa_nnnn=0.3),
+    "soft": Case(mould="small_rectangle", delta=0.9, kappa_nnn=0.1, kappa_nnnn=0.01),
+}
+
+
+class Tradeoff(Block):
+    """The comparison of speed and accuracy."""
+
+    methods: tuple[Annotated[str, AfterValidator(_method)], ...] = Field(
+        ("draft", "standard", "anneal-1e3", SURROGATE),
+        description="what is compared with the reference: accuracies; surrogate; or the standard run in "
+        "another model or raster, such as '3 layers', 'shells 1 2 4', '64 pixels'",
+    )
+    cases: dict[Name, Case] = Field(
+        default_factory=lambda: dict(CASES),
+        description="moulds and parameters to compare on, by name; empty: no comparison",
+    )
+
+    @property
+    def rasters(self) -> list[int]:
+        """Sides of other rasters that are compared."""
+        variants = map(variant_named, self.methods)
+        return [found.pixels for found in variants if found is not None and found.pixels is not None]
+
+    @property
+    def annealed(self) -> tuple[str, str] | None:
+        """The case and the method that fold a tissue through itself: the largest delta, the last anneal."""
+        anneals = [method for method in self.methods if method.startswith("anneal")]
+        if not anneals or not self.cases:
+            return None
+        return max(self.cases, key=lambda name: self.cases[name].delta), anneals[-1]
 
 
 @dataclass(frozen=True)
@@ -64,8 +154,8 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Case:
-    """A mould, its parameters, and the setting of a comparison."""
+class Trial:
+    """A case as it is run."""
 
     name: str
     mould: Mould
@@ -75,14 +165,13 @@ class Case:
     seed: int
 
     @classmethod
-    def of(cls, content: dict[str, Any], mould: Mould) -> "Case":
-        """The case that a configuration's `comparison` states."""
-        given, model = content["case"], content["model"]
+    def of(cls, content: dict[str, Any], mould: Mould) -> "Trial":
+        """The trial that a configuration's `trial` states."""
         return cls(
-            given["name"],
+            content["name"],
             mould,
-            CellParameters(given["delta"], given["kappa_nnn"], given["kappa_nnnn"]),
-            NetworkModel(model["layers"], tuple(model["shells"]), model["tension"]),
+            CellParameters(content["delta"], content["kappa_nnn"], content["kappa_nnnn"]),
+            NetworkModel(content["layers"], tuple(content["shells"]), content["tension"]),
             content["pixels"],
             content["seed"] % 2**31,
         )
@@ -101,75 +190,48 @@ class Case:
         return shape_ratios(fields[0], CastMould(self.mould, self.model.layers, fields.shape[-1]))
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """What is compared.
-
-    Parameters
-    ----------
-    methods : tuple of str
-        Accuracies, as `raptor.condor.accuracy_named` takes them.
-    layers : tuple of int
-        Other numbers of layers, at `standard`, their fields scaled to the case's number.
-    shells : tuple
-        Other choices of shells, at `standard`.
-    pixels : tuple of int
-        Other rasters of the `standard` run.
-    seeds : int
-        Reference runs that measure the spread.
-    """
-
-    methods: tuple[str, ...]
-    layers: tuple[int, ...] = ()
-    shells: tuple[tuple[int, int, int], ...] = ()
-    pixels: tuple[int, ...] = ()
-    seeds: int = 4
-
-    @property
-    def runs(self) -> int:
-        """Simulations that one case takes."""
-        return self.seeds + len(self.methods) + len(self.layers) + len(self.shells) + bool(self.pixels)
-
-
 def compare(
-    case: Case,
-    comparison: Comparison,
+    trial: Trial,
+    methods: Sequence[str],
     surrogate: "Surrogate | None" = None,
     on_progress: Callable[[str], None] = lambda what: None,
 ) -> pd.DataFrame:
     """One row a method: cost, energy, and the errors of fields and shapes against reference runs.
 
     `energy_above_best` is the part by which the energy of bonds, walls and contacts lies above the least
-    of any run of the same network without reversed bonds. `core_seconds` are processor time of the
+    of any run of the same network without inverted bonds. `core_seconds` are processor time of the
     run, kernels being compiled and loaded before.
     """
-    _warm_up(comparison.methods)
+    accuracies = [name for name in methods if name != SURROGATE and variant_named(name) is None]
+    variants = {name: found for name in methods if (found := variant_named(name)) is not None}
+    _warm_up(accuracies)
     runs = []
-    for offset in range(1, comparison.seeds + 1):
-        runs.append(_timed(partial(case.simulate, "reference", case.seed + offset)))
+    for offset in range(1, REFERENCES + 1):
+        runs.append(_timed(partial(trial.simulate, "reference", trial.seed + offset)))
         on_progress(f"reference, seed {offset}")
-    stacks = [case.fields(s) for s, _ in runs]
-    shapes = np.array([case.shape(stack) for stack in stacks])
+    stacks = [trial.fields(s) for s, _ in runs]
+    shapes = np.array([trial.shape(stack) for stack in stacks])
     reference = Reference(stacks, shapes)
     rows = [
-        _row(case, reference, f"reference, seed {own + 1}", stacks[own], seconds, own) | _outcome(s)
+        _row(trial, reference, f"reference, seed {own + 1}", stacks[own], seconds, own) | _outcome(s)
         for own, (s, seconds) in enumerate(runs)
     ]
-    for method in comparison.methods:
-        s, seconds = _timed(partial(case.simulate, method))
-        rows.append(_row(case, reference, method, case.fields(s), seconds) | _outcome(s))
+    for method in accuracies:
+        s, seconds = _timed(partial(trial.simulate, method))
+        rows.append(_row(trial, reference, method, trial.fields(s), seconds) | _outcome(s))
         on_progress(method)
     totals = [row["energy"] + row["wall_energy"] for row in rows]
-    unfolded = [t for t, row in zip(totals, rows, strict=True) if row["inverted_fraction"] == 0]
-    best = min(unfolded, default=np.nan)
+    intact = [t for t, row in zip(totals, rows, strict=True) if row["inverted_fraction"] == 0]
+    best = min(intact, default=np.nan)
     for total, row in zip(totals, rows, strict=True):
         row["energy_above_best"] = total / best - 1 if best else np.nan
-    rows += _other_models(case, reference, comparison, on_progress)
-    rows += _other_rasters(case, reference, comparison.pixels, on_progress)
+    for name, variant in variants.items():
+        rows.append(_of_variant(trial, reference, name, variant))
+        on_progress(name)
     if surrogate is not None:
-        predicted, seconds = _timed(partial(surrogate.predict, case.mould, [case.parameters]))
-        shape = surrogate.ratios(predicted[0, 0], surrogate.cast(case.mould))
-        row = _row(case, reference, "surrogate", predicted[0], seconds)
+        predicted, seconds = _timed(partial(surrogate.predict, trial.mould, [trial.parameters]))
+        shape = surrogate.ratios(predicted[0, 0], surrogate.cast(trial.mould))
+        row = _row(trial, reference, SURROGATE, predicted[0], seconds)
         row["area_error"], row["width_error"] = reference.shape_error(shape)
         rows.append(row)
     spread = {"density_spread": reference.spread[0], "area_spread": shapes[:, 0].std(ddof=1)}
@@ -178,46 +240,27 @@ def compare(
     return table.fillna({"cells": runs[0][0].cells})
 
 
-def _warm_up(methods: tuple[str, ...]) -> None:
+def _warm_up(accuracies: Sequence[str]) -> None:
     """Load the kernels of every precision."""
     gel = Mould(shapely.box(-2, -2, 2, 2), name="gel")
-    for name in {"standard", *("standard-float32" for method in methods if method.endswith("-float32"))}:
+    for name in {"standard", *("standard-float32" for method in accuracies if method.endswith("-float32"))}:
         simulate(gel, CellParameters(0.5, 0.5, 0.3), NetworkModel(2), name)
 
 
-def _other_models(
-    case: Case, reference: Reference, comparison: Comparison, on_progress: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    """The `standard` run with other layers or shells, its fields scaled to the case's layers."""
-    models = {f"{n} layers": replace(case.model, layers=n) for n in comparison.layers}
-    for shells in comparison.shells:
-        name = "shells " + " ".join(str(shell) for shell in shells)
-        models[name] = replace(case.model, shells=shells)
-    rows = []
-    for name, model in models.items():
-        other = replace(case, model=model)
-        s, seconds = _timed(partial(other.simulate, "standard"))
-        fields = case.fields(s) * case.model.layers / model.layers
-        rows.append(_row(case, reference, name, fields, seconds) | _outcome(s))
-        on_progress(name)
-    return rows
-
-
-def _other_rasters(
-    case: Case, reference: Reference, rasters: tuple[int, ...], on_progress: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    """The `standard` run on other rasters, spread evenly over the case's pixels."""
-    if not rasters:
-        return []
-    s, simulating = _timed(partial(case.simulate, "standard"))
-    on_progress("rasters")
-    rows = []
-    for pixels in rasters:
-        fields, seconds = _timed(partial(case.fields, s, pixels))
-        row = _row(case, reference, f"{pixels} pixels", _resampled(fields, case.pixels), seconds)
-        row["area_error"], row["width_error"] = reference.shape_error(case.shape(fields))
-        rows.append(row | {"core_seconds": simulating + seconds, "raster_seconds": seconds})
-    return rows
+def _of_variant(trial: Trial, reference: Reference, name: str, variant: Variant) -> dict[str, Any]:
+    """The `standard` run of a variant, its fields in cells of the trial's layers, on the trial's raster."""
+    model = replace(
+        trial.model,
+        layers=variant.layers or trial.model.layers,
+        shells=variant.shells or trial.model.shells,
+    )
+    other = replace(trial, model=model, pixels=variant.pixels or trial.pixels)
+    s, seconds = _timed(partial(other.simulate, "standard"))
+    fields, rastering = _timed(partial(other.fields, s))
+    fields = fields * trial.model.layers / model.layers
+    row = _row(trial, reference, name, _resampled(fields, trial.pixels), seconds) | _outcome(s)
+    row["area_error"], row["width_error"] = reference.shape_error(trial.shape(fields))
+    return row | {"raster_seconds": rastering}
 
 
 def _resampled(fields: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
@@ -247,7 +290,7 @@ def _outcome(s: Tissue) -> dict[str, Any]:
 
 
 def _row(
-    case: Case,
+    trial: Trial,
     reference: Reference,
     method: str,
     fields: NDArray[np.floating],
@@ -255,9 +298,9 @@ def _row(
     own: int | None = None,
 ) -> dict[str, Any]:
     errors = reference.field_error(fields, own)
-    area_error, width_error = reference.shape_error(case.shape(fields), own)
+    area_error, width_error = reference.shape_error(trial.shape(fields), own)
     return {
-        "case": case.name,
+        "case": trial.name,
         "method": method,
         "core_seconds": seconds,
         "density_error": float(errors[0]),
@@ -290,6 +333,6 @@ def summarise(table: pd.DataFrame) -> pd.DataFrame:
         "area_error_max": groups["area_error"].agg(lambda x: x.abs().max()),
         "width_error": groups["width_error"].agg(lambda x: x.abs().mean()),
         "width_error_max": groups["width_error"].agg(lambda x: x.abs().max()),
-        "folded_fraction_max": groups["inverted_fraction"].max(),
+        "inverted_fraction_max": groups["inverted_fraction"].max(),
     }
     return pd.DataFrame(spreads).reset_index()

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from raptor.dataset.compare import differences
-from tests.workflow.conftest import ROOT
-from tests.workflow.test_end_to_end import variant
+from tests.workflow.conftest import ROOT, variant
 
 SLURM = Path(__file__).with_name("slurm")
 PROFILE = ROOT / "workflow" / "profiles" / "slurm"
@@ -51,8 +50,9 @@ def test_jobs_are_submitted_a_cancelled_one_again_and_the_data_are_the_same(
     log = place.folder / "snakemake.log"
     command = place.command(
         "--workflow-profile", str(PROFILE), "--slurm-init-seconds-before-status-checks", "3",
-        "--slurm-no-account", "--slurm-keep-successful-logs", "--latency-wait", "5", "dataset",
-        configuration=variant(tmp_path, simulation__shard_size=2),
+        "--slurm-no-account", "--slurm-keep-successful-logs", "--latency-wait", "5",
+        "campaign_paper",
+        configuration=variant(tmp_path, shard_size=2),
     )  # fmt: skip
     environment = os.environ | {
         "SNAKEMAKE_PROFILE": str(ROOT / "workflow" / "profiles" / "default"),
@@ -72,10 +72,12 @@ def test_jobs_are_submitted_a_cancelled_one_again_and_the_data_are_the_same(
     text = log.read_text()
     submitted = re.findall(r"Job \d+ has been submitted with SLURM jobid (\d+)", text)
     assert victims[0] in submitted
-    assert len(submitted) >= 6 + 4 + 1  # the rules, four shards, one of them twice
+    assert len(submitted) >= 5 + 4 + 1  # the rules, four shards, one of them twice
     assert re.search(rf"SLURM-job '{victims[0]}' failed, SLURM status is: '?CANCELLED", text)
     ended = (cluster / "log" / "jobs.txt").read_text()
     assert re.search(rf"JobId={victims[0]} .*JobState=CANCELLED", ended)
     assert ended.count("JobState=COMPLETED") == len(submitted) - 1
-    results = [folder / "results" / "tiny" for folder in (finished.folder, place.folder)]
+    results = [
+        folder / "results" / "tiny" / "campaigns" / "paper" for folder in (finished.folder, place.folder)
+    ]
     assert differences(*results) == []

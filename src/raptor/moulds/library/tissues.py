@@ -80,25 +80,6 @@ def load_tissues(
     return {name: _tissue(content, name, path) for name in (content if names is None else names)}
 
 
-def require_measured(tissues: Mapping[str, MeasuredTissue], unmeasured: Mapping[str, MeasuredTissue]) -> None:
-    """Find out before any work that tissues to fit were measured, and that the others have a delta.
-
-    Raises
-    ------
-    RaptorError
-        Where one was not, or has none.
-    """
-    for name, tissue in tissues.items():
-        if not tissue.measured:
-            raise RaptorError(
-                f"tissue {name} has neither area_ratio nor width_ratio, so it cannot be fitted; name it in "
-                "fit.unmeasured instead of fit.tissues"
-            )
-    for name, tissue in unmeasured.items():
-        if "delta" not in tissue.paper:
-            raise RaptorError(f"tissue {name} has no paper: {{delta: ...}} to be simulated at; give it one")
-
-
 def tissue(name: str, path: str | Path | None = None) -> MeasuredTissue:
     """A measured tissue by name, of the library or of another file.
 

@@ -1,0 +1,16 @@
+"""Check a campaign; name every fault."""
+
+from pathlib import Path
+
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.dataset.check import check_campaign
+
+with logged(snakemake.log[0]):
+    path = Path(snakemake.output.checked)
+    faults = list(check_campaign(path.parent, snakemake.params.fraction))
+    if faults:
+        raise RaptorError("; ".join(faults))
+    with atomic_path(path) as temporary:
+        temporary.write_text("no faults\n")

@@ -1,0 +1,16 @@
+"""Check that no mould stands in two splits of any campaigns; name every one that does."""
+
+from pathlib import Path
+
+from raptor.core.errors import RaptorError
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.dataset.check import check_splits
+
+with logged(snakemake.log[0]):
+    stacks = {Path(stack).parent.name: Path(stack) for stack in snakemake.input.stacks}
+    faults = list(check_splits(stacks))
+    if faults:
+        raise RaptorError("; ".join(faults))
+    with atomic_path(Path(snakemake.output.checked)) as path:
+        path.write_text("no faults\n")

@@ -1,0 +1,18 @@
+"""Put simulated and predicted contraction of a campaign into one table, and say where they differ most."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from raptor.core.files import atomic_path
+from raptor.core.jobs import logged
+from raptor.studies.sweep import contraction, differences
+
+with logged(snakemake.log[0]):
+    predicted = pd.read_csv(snakemake.input.predicted) if snakemake.input.predicted else None
+    table = contraction(pd.read_csv(snakemake.input.simulated), predicted)
+    with atomic_path(Path(snakemake.output.table)) as path:
+        table.to_csv(path, index=False)
+    with atomic_path(Path(snakemake.output.differences)) as path:
+        path.write_text(json.dumps(differences(table), indent=1) + "\n")

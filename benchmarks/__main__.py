@@ -9,13 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.kernels import Rate, bounds, gradient_rates, trial_rates
-from benchmarks.solvers import (
-    Minimised,
-    against_scipy,
-    compare_preconditioners,
-    posted_rectangle,
-    time_against_cells,
-)
+from benchmarks.solvers import Minimised, against_scipy, posted_rectangle, time_against_cells
 from raptor.condor.simulate import simulate
 from raptor.condor.system import build_system
 from raptor.moulds import Mould, read_mould
@@ -46,12 +40,6 @@ def main(
         _print(f"The machine's bounds on it, {name}", ("what", "measured", "million a second"), limits)
     _print_rates("Trial moves, million a second", trial_rates(mould, MIDDLE, model))
     _print_minimisers(list(against_scipy(mould, MIDDLE, model, 50 if quick else 500)))
-    at = (25, 50) if quick else (25, 50, 100, 200, 400)
-    for name, parameters in (("middle", MIDDLE), ("soft", SOFT)):
-        found = compare_preconditioners(mould, parameters, model, at)
-        compared = [(p.name, *(f"{e:.2f}" for e in p.energies), f"{p.milliseconds:.2f}") for p in found]
-        heads = ("preconditioner", *(f"E after {n}" for n in at), "ms an application")
-        _print(f"L-BFGS with preconditioners, a step of the {name} case", heads, compared)
     _print_levels(mould, model, 2 if quick else SEEDS)
     _print_scaling((300, 600) if quick else (1000, 3000, 10000, 30000, 100000), 1 if quick else 3)
 

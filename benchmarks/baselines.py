@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from raptor.condor.energy import SOFTENING
+from raptor.condor.energy import SOFTENING, natural_length
 from raptor.condor.lattice import Lattice
-from raptor.core.compiled import kernel
+
+usual = numba.njit(nogil=True, error_model="numpy", fastmath=True)
+"""As such loops are usually compiled: sums in any order."""
 
 
 class Table(NamedTuple):
@@ -33,7 +36,7 @@ def neighbour_table(lattice: Lattice) -> Table:
     return Table(start, other[order], stiffness[order], rest[order])
 
 
-@kernel
+@usual
 def _bond(state, n, i, j, rest, delta):
     """|l| - L', |l|, u and both projections of one bond of a state with unit orientations."""
     lx, ly, lz = state[j] - state[i], state[j + n] - state[i + n], state[j + 2 * n] - state[i + 2 * n]
@@ -41,11 +44,11 @@ def _bond(state, n, i, j, rest, delta):
     ux, uy, uz = lx / length, ly / length, lz / length
     first = ux * state[i + 3 * n] + uy * state[i + 4 * n] + uz * state[i + 5 * n]
     second = ux * state[j + 3 * n] + uy * state[j + 4 * n] + uz * state[j + 5 * n]
-    natural = rest * (1.0 - 0.5 * delta * (2.0 - first * first - second * second))
+    natural = natural_length(rest, delta, first * first + second * second)
     return length - natural, length, ux, uy, uz, first, second
 
 
-@kernel
+@usual
 def _pull(state, n, i, j, stiffness, rest, delta):
     """Energy of one bond, dE/dl (3) and dE/ds of both ends along u."""
     stretch, length, ux, uy, uz, first, second = _bond(state, n, i, j, rest, delta)
@@ -59,7 +62,7 @@ def _pull(state, n, i, j, stiffness, rest, delta):
     return 0.5 * tension * stretch, px, py, pz, ux, uy, uz, twist * first, twist * second
 
 
-@kernel
+@usual
 def gradient_by_neighbours(state, gradient, table, delta):
     """Energy and gradient (unit orientations), each bond twice over a table of neighbours."""
     n = state.size // 6
@@ -78,7 +81,7 @@ def gradient_by_neighbours(state, gradient, table, delta):
     return energy
 
 
-@kernel
+@usual
 def gradient_by_bonds(state, gradient, first, second, stiffness, rest, delta):
     """Energy and gradient (unit orientations), each bond once, one after another."""
     n = state.size // 6
@@ -98,7 +101,7 @@ def gradient_by_bonds(state, gradient, first, second, stiffness, rest, delta):
     return energy
 
 
-@kernel
+@usual
 def _cell_energy(state, n, i, table, delta):
     energy = 0.0
     for entry in range(table.start[i], table.start[i + 1]):
@@ -107,7 +110,7 @@ def _cell_energy(state, n, i, table, delta):
     return energy
 
 
-@kernel
+@usual
 def metropolis_sweep(state, table, delta, temperature, step, turn, rng):
     """Try every cell once, the usual way; returns the number of accepted trial moves."""
     n = state.size // 6
@@ -144,8 +147,8 @@ def torch_gradient(lattice: Lattice, delta: float) -> Callable[[NDArray[Any]], t
         length = (displacement.square().sum(0) + SOFTENING).sqrt()
         u = displacement / length
         squares = sum((u * orientations[:, end]).sum(0).square() for end in (first, second))
-        natural = rest * (1 - delta / 2 * (2 - squares))
-        energy = (0.5 * stiffness * (length - natural).square()).sum()
+        stretch = length - natural_length(rest, delta, squares)
+        energy = (0.5 * stiffness * stretch.square()).sum()
         (gradient,) = torch.autograd.grad(energy, variable)
         return energy.item(), gradient.numpy().ravel()
 

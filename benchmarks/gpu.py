@@ -4,7 +4,7 @@ python -m benchmarks.gpu config/paper.yaml --output gpu.json
 
 Checks batches against the compiled solver, then times the simulation of the whole design (or of as much as
 the time allows), its images, training and prediction, beside what the device can do at most. It runs on
-the processor too, where it shows that everything works.
+the processor too, where it shows that everything works. It has never yet been run on a GPU.
 """
 
 import json

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from raptor.condor.simd import lanes, load, sqrt, store
+from raptor.condor.simd import lanes, load, muladd, sqrt, store
 from raptor.core.compiled import kernel
 
 REPEATS = 5
@@ -36,8 +36,8 @@ def _arithmetic(array, times):
     a, b, c, d = load(array, w), load(array, 2 * w), load(array, 3 * w), load(array, 4 * w)
     e, f, g, h = load(array, 5 * w), load(array, 6 * w), load(array, 7 * w), load(array, 8 * w)
     for _ in range(times):
-        a, b, c, d = a * x + x, b * x + x, c * x + x, d * x + x
-        e, f, g, h = e * x + x, f * x + x, g * x + x, h * x + x
+        a, b, c, d = muladd(a, x, x), muladd(b, x, x), muladd(c, x, x), muladd(d, x, x)
+        e, f, g, h = muladd(e, x, x), muladd(f, x, x), muladd(g, x, x), muladd(h, x, x)
     store(array, 0, a + b + c + d + e + f + g + h)
 
 

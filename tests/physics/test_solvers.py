@@ -118,7 +118,7 @@ def test_agitation_moves_cells_from_its_first_sweeps(delta):
             state, system.order, system.sublattices, system.walls, delta, np.random.default_rng(1),
             sweeps=sweeps, initial_temperature=agitation_temperature(delta), temperature_factor=COOLING,
         )  # fmt: skip
-        assert 0.1 < found.acceptance < 0.7
+        assert 0.1 < found.acceptance_rate < 0.7
 
 
 def test_single_precision_agrees_within_the_spread_of_seeds():

@@ -8,11 +8,9 @@ import sys
 import numpy as np
 import pytest
 from benchmarks.baselines import gradient_by_bonds, gradient_by_neighbours, neighbour_table, torch_gradient
-from benchmarks.solvers import elastic_stiffness
 
 from raptor.condor.energy import objective, unit_orientations
 from raptor.condor.network import build_network
-from raptor.condor.system import build_system
 from raptor.condor.walls import NO_WALLS
 from tests.small import ROOT
 
@@ -37,26 +35,11 @@ def test_baselines_have_the_energy_and_gradient_of_the_kernel(lattice, random_st
         assert np.abs(blocks.ravel() - wanted).max() < 1e-9 * np.abs(wanted).max()
 
 
-def test_elastic_stiffness_is_the_curvature_without_contraction(small_mould, parameters, model):
-    """At rest and Delta = 0 the Hessian of the energy is the sum of k u u^T."""
-    system = build_system(small_mould, parameters, model)
-    n = system.lattice.cells
-    rest = np.concatenate([system.lattice.sites.T.ravel(), np.ones(3 * n)])
-    push = np.zeros(6 * n)
-    push[: 3 * n] = np.random.default_rng(0).normal(size=3 * n)
-    step = 1e-5
-    ends = [objective(rest + sign * step * push, system.network, NO_WALLS, 0.0)[2] for sign in (1, -1)]
-    curvature = (ends[0] - ends[1])[: 3 * n] / (2 * step)
-    assert elastic_stiffness(system, rest) @ push[: 3 * n] == pytest.approx(
-        curvature, abs=2e-3 * np.abs(curvature).max()
-    )
-
-
 def test_the_benchmark_prints_its_tables():
     command = [sys.executable, "-m", "benchmarks", "--quick"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    for title in ("Gradient", "bounds", "Trial moves", "preconditioners", "Whole runs", "to the power"):
+    for title in ("Gradient", "bounds", "Trial moves", "Whole runs", "to the power"):
         assert title in done.stdout
 
 

@@ -38,7 +38,7 @@ class Annealed(NamedTuple):
     """An annealed state (6 * cells,) and the acceptance rate over its last tenth of sweeps."""
 
     state: NDArray[Any]
-    acceptance: float
+    acceptance_rate: float
 
 
 class _Work(NamedTuple):
@@ -226,9 +226,9 @@ def anneal(
     ordered[width:-width] = unit_orientations(state).reshape(6, -1)[:, order].ravel()
     work = _Work(np.zeros(DRAWS * width, state.dtype), np.zeros((ROWS, width), state.dtype))
     key = rng.integers(2**64, dtype=np.uint64)
-    acceptance = _anneal_kernel(
+    acceptance_rate = _anneal_kernel(
         ordered, len(order), network, walls, delta, initial_temperature, temperature_factor, sweeps, key, work
     )
     annealed = np.empty_like(state)
     annealed.reshape(6, -1)[:, order] = ordered[width:-width].reshape(6, -1)
-    return Annealed(annealed, acceptance)
+    return Annealed(annealed, acceptance_rate)

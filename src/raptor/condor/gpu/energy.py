@@ -12,7 +12,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from raptor.condor.energy import CONTACT_LENGTH, SOFTENING
+from raptor.condor.energy import CONTACT_LENGTH, SOFTENING, natural_length
 from raptor.condor.gpu.layout import BLOCK, Batch
 from raptor.condor.walls import SPACING
 
@@ -69,10 +69,9 @@ def _bond_terms(
     first = ux * ax + uy * ay + uz * az
     second = ux * bx + uy * by + uz * bz
     squares = first * first + second * second
-    half = 0.5 * delta * rest
-    stretch = squared * inverse - (rest - 2.0 * half) - half * squares
+    stretch = squared * inverse - natural_length(rest, delta, squares)
     tension = torch.where(there, stiffness, 0.0) * stretch
-    twist = -2.0 * half * tension
+    twist = -delta * rest * tension
     turn = twist * inverse
     along = tension - turn * squares
     by_first, by_second = turn * first, turn * second
@@ -237,4 +236,5 @@ def bond_stretch(cell: Sequence[Tensor], other: Sequence[Tensor], rest: Tensor, 
     first = (lx * cell[3] + ly * cell[4] + lz * cell[5]) * inverse
     second = (lx * other[3] + ly * other[4] + lz * other[5]) * inverse
     squares = first * first + second * second
-    return squared * inverse - (rest - rest * delta) - 0.5 * rest * delta * squares
+    natural: Tensor = natural_length(rest, delta, squares)
+    return squared * inverse - natural

@@ -1,7 +1,7 @@
 """From cells to pixels on a GPU: the fields of `raptor.raster` as products of matrices.
 
 The weight of a cell on a pixel is a product of one along x and one along y, so a field is
-(weights along y)^T diag(z) (weights along x), which a GPU computes at its full rate.
+(weights along y)^T diag(z) (weights along x), work that suits a GPU. Never yet measured on one.
 """
 
 import numpy as np

@@ -77,9 +77,7 @@ def test_standard_moulds_are_scaled_and_the_users_own_are_not(files):
 @pytest.mark.parametrize("moulds", ["long_bars", "slender_strips"])
 def test_moulds_unlike_the_random_ones_are_held_out_and_castable(moulds):
     given = design("unlike", moulds=moulds, runs=3, **HELD_OUT)
-    given = given.model_copy(
-        update={"random_moulds": given.random_moulds.model_copy(update={"cells": (400, 900)})}
-    )
+    given = given.model_copy(update={"drawn_from": given.drawn_from.model_copy(update={"cells": (400, 900)})})
     runs, drawn = given.make()
     assert all(run.split == "test" for run in runs)
     assert all(mould.tethers for mould in drawn)

@@ -10,6 +10,7 @@ from raptor.core.blocks import Block, Name, Positive, content_hash
 from raptor.core.version import MODEL_VERSION, STACK_FORMAT
 from raptor.dataset.campaign import Campaign, Design, Grid
 from raptor.frame import IMAGE_SIZE
+from raptor.moulds.families import MouldFamilies
 from raptor.moulds.random_moulds import MARGIN, RandomMoulds
 from raptor.parameters import NetworkModel
 from raptor.studies.tradeoff import SURROGATE, Tradeoff
@@ -56,6 +57,7 @@ class Configuration(Block):
         0.7, gt=0, le=1.1, description="moulds of the library are cast at this fraction of their size"
     )
     random_moulds: RandomMoulds = Field(default_factory=lambda: RandomMoulds())
+    mould_families: MouldFamilies = Field(default_factory=lambda: MouldFamilies())
     campaigns: dict[Name, Campaign] = Field(
         default_factory=lambda: dict(CAMPAIGNS),
         min_length=1,
@@ -184,12 +186,13 @@ class Configuration(Block):
     def design(self, campaign: str) -> Design:
         """All that the design of a campaign depends on, other campaigns and models aside."""
         block = self.campaigns[campaign]
+        drawn_from = self.mould_families if block.kind == "families" else self.random_moulds
         return Design(
             name=campaign,
             seed=self.seed,
             layers=self.layers if block.kind else None,
             mould_scale=self.mould_scale if block.files() else None,
-            random_moulds=self.random_moulds if block.kind else None,
+            drawn_from=drawn_from if block.kind else None,
             campaign=block,
         )
 

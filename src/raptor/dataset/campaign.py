@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.random import SeedSequence
@@ -17,14 +18,16 @@ from pydantic import Field, model_validator
 from raptor.core.blocks import Block, Name, Positive
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
+from raptor.moulds.families import MouldFamilies
 from raptor.moulds.geometry import Mould
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.moulds.reading import SUFFIXES, find_mould, read_at_scale
 from raptor.moulds.unlike import long_bars, slender_strips
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
 
-DRAWN: dict[str, Callable[[RandomMoulds, np.random.Generator, int, str], Mould]] = {
+DRAWN: dict[str, Callable[[Any, np.random.Generator, int, str], Mould]] = {
     "random": RandomMoulds.draw,
+    "families": MouldFamilies.draw,
     "long_bars": long_bars,
     "slender_strips": slender_strips,
 }
@@ -72,8 +75,9 @@ class Campaign(Block):
     moulds: str | tuple[str, ...] = Field(
         "random",
         min_length=1,
-        description="random: drawn by random_moulds; long_bars, slender_strips: drawn unlike those; or names "
-        "of library moulds, mould files or folders of them, one or a list",
+        description="random, families: drawn by random_moulds or mould_families; long_bars, slender_strips: "
+        "drawn unlike the random ones; or names of library moulds, mould files or folders of them, one or "
+        "a list",
     )
     repeat_of: Name | None = Field(
         None, description="campaign whose test runs are simulated again with other seeds: the noise floor"
@@ -230,7 +234,7 @@ class Design(Block):
     seed: int
     layers: int | None
     mould_scale: float | None
-    random_moulds: RandomMoulds | None
+    drawn_from: RandomMoulds | MouldFamilies | None
     campaign: Campaign
 
     def make(
@@ -271,6 +275,7 @@ class Design(Block):
             runs = []
             for place, draw in enumerate(draws):
                 own = notes.get(draw.number, {}) | ({"edge": str(edges[place])} if campaign.edge else {})
+                own |= {"family": draw.mould.family} if draw.mould.family else {}
                 rows = zip((p for p in draw.points for _ in range(campaign.seeds)), draw.seeds, strict=True)
                 runs += [Run(0, draw.mould.name, splits[place], p, seed, own) for p, seed in rows]
             moulds = list({draw.mould.name: draw.mould for draw in draws}.values())
@@ -305,8 +310,8 @@ class Design(Block):
 
     def _draw_mould(self, stream: SeedSequence, number: int) -> Mould:
         name, draw = f"{self.name}_{number:05d}", DRAWN[str(self.campaign.kind)]
-        assert self.random_moulds is not None and self.layers is not None
-        return draw(self.random_moulds, np.random.default_rng(stream), self.layers, name)
+        assert self.drawn_from is not None and self.layers is not None
+        return draw(self.drawn_from, np.random.default_rng(stream), self.layers, name)
 
     def _select(
         self, score: Score | None, on_progress: Callable[[int], None]

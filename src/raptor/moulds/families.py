@@ -4,6 +4,8 @@ A mould is an outline of a family (`outlines`), at a drawn size, with a layout o
 (`tether_layouts`), rotated and shifted in the frame. Moulds that cannot be cast well are rejected.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from numpy.random import Generator
@@ -21,13 +23,13 @@ from raptor.moulds.tether_layouts import LAYOUTS
 ATTEMPTS = 400
 NARROWEST = 2.5  # l0; the narrowest neck of an outline
 GAP = 1.5  # l0; least gap between two tethers
+MARGIN = 2.2  # l0; rim of the image that stays free, 3 sigma: the library's long moulds need it
 
 
 class MouldFamilies(Block):
     """The distribution of moulds as people make them; lengths in l0."""
 
     cells: tuple[Positive, Positive] = Field((1500, 14000), description="bounds of the number of cells")
-    margin: float = Field(2.2, ge=2.2, le=20, description="rim of the image that stays free: 3 sigma or more")
     families: dict[str, Weight] = Field(
         {
             name: 2.0 if name in ("rectangle", "rounded_rectangle", "dog_bone", "i_shape") else 1.0
@@ -56,8 +58,13 @@ class MouldFamilies(Block):
             raise ValueError(f"cells is {list(self.cells)}; an ascending range is needed")
         return self
 
-    def draw(self, rng: Generator, layers: int, name: str) -> tuple[Mould, str]:
-        """Draw one mould with the given number of layers; returns it with the name of its family.
+    def draw(self, rng: Generator, layers: int, name: str) -> Mould:
+        """Draw one mould; the same generator state gives the same mould.
+
+        Parameters
+        ----------
+        layers : int
+            Cell layers, which turn a number of cells into an area.
 
         Raises
         ------
@@ -69,10 +76,10 @@ class MouldFamilies(Block):
             layout = "holes" if family == "ring" else _weighted(rng, self.layouts)
             mould = self._attempt(rng, family, layout, layers)
             if mould is not None:
-                return Mould(mould.outline, mould.tethers, symmetry_class(mould), name), family
+                return replace(mould, symmetry=symmetry_class(mould), name=name, family=family)
         raise RaptorError(
             f"no mould of the family {family} with {self.cells[0]} to {self.cells[1]} cells in {layers} "
-            f"layers was found in {ATTEMPTS} attempts; widen the bounds under 'families'"
+            f"layers was found in {ATTEMPTS} attempts; widen the bounds under 'mould_families'"
         )
 
     def _attempt(self, rng: Generator, family: str, layout: str, layers: int) -> Mould | None:
@@ -81,7 +88,7 @@ class MouldFamilies(Block):
             outline = irregular(rng, outline, rng.uniform(0.01, 0.05))
         area = rng.uniform(*self.cells) / layers
         factor = np.sqrt(area / outline.area)
-        reach = IMAGE_SIZE / 2 - self.margin
+        reach = IMAGE_SIZE / 2 - MARGIN
         x0, y0, x1, y1 = (factor * bound for bound in outline.bounds)
         if max(x1 - x0, y1 - y0) > 2 * reach:
             # As large as the frame allows: long moulds fill it.

@@ -14,7 +14,7 @@ from raptor.core.files import atomic_path, read_text
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
 GEOMETRIES = ("Polygon", "MultiPolygon", "LineString", "MultiLineString", "GeometryCollection")
-PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area", "mm_per_l0")
+PROPERTIES = ("mould", "description", "source", "tethers", "symmetry", "area", "mm_per_l0", "family")
 
 
 def read_moulds(path: Path, only: Container[str] | None = None) -> list[Mould]:
@@ -114,7 +114,14 @@ def from_feature(feature: dict[str, Any], path: Path = Path("GeoJSON")) -> Mould
     tethers = tethers_of(properties, where)
     symmetry = str(properties.get("symmetry", "unknown"))
     try:
-        return Mould(outline, tethers, symmetry, name, properties.get("mm_per_l0"))
+        return Mould(
+            outline,
+            tethers,
+            symmetry,
+            name,
+            properties.get("mm_per_l0"),
+            family=str(properties.get("family", "")),
+        )
     except RaptorError as error:
         raise RaptorError(f"mould file {path}: {error}") from error
 

@@ -138,6 +138,8 @@ class Mould:
         Mould id or file name, for messages.
     mm_per_l0 : float or None
         Millimetres per l0, where the mould was drawn in a real unit.
+    family : str
+        The family of outlines that it was drawn from (`families`), if any.
     note : str
         How a drawing was scaled, for people.
 
@@ -158,6 +160,7 @@ class Mould:
     name: str = field(compare=False)
     mm_per_l0: float | None = field(compare=False)
     note: str = field(compare=False)
+    family: str = field(compare=False)
 
     def __init__(
         self,
@@ -167,6 +170,7 @@ class Mould:
         name: str = "mould",
         mm_per_l0: float | None = None,
         note: str = "",
+        family: str = "",
     ) -> None:
         if not isinstance(outline, shapely.Polygon):
             raise RaptorError(
@@ -177,7 +181,7 @@ class Mould:
         standing = tuple(_tether(each, name) for each in (*tethers, *holes))
         # The values of a frozen dataclass cannot be set by name.
         vars(self).update(outline=solid, tethers=standing, symmetry=symmetry, name=name)
-        vars(self).update(mm_per_l0=mm_per_l0, note=note)
+        vars(self).update(mm_per_l0=mm_per_l0, note=note, family=family)
         self.validate()
 
     def validate(self) -> None:
@@ -244,6 +248,8 @@ class Mould:
         }
         if self.mm_per_l0 is not None:
             properties["mm_per_l0"] = self.mm_per_l0
+        if self.family:
+            properties["family"] = self.family
         geometry = {"type": "Polygon", "coordinates": [_ring(self.outline)]}
         return {"type": "Feature", "geometry": geometry, "properties": properties}
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import shapely
 
+from raptor.condor.accuracy import ACCURACIES, Accuracy, accuracy_named, annealed
 from raptor.condor.anneal import anneal
 from raptor.condor.contract import (
     CONTACT,
@@ -17,7 +18,7 @@ from raptor.condor.energy import objective
 from raptor.condor.lattice import build_lattice
 from raptor.condor.minimise import minimise
 from raptor.condor.network import build_network, build_sublattices
-from raptor.condor.simulate import ACCURACIES, Accuracy, accuracy_named, annealed, simulate
+from raptor.condor.simulate import simulate
 from raptor.condor.system import build_system, cast_state
 from raptor.condor.walls import NO_WALLS, build_walls
 from raptor.core.errors import RaptorError

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raptor.condor.simulate import Tissue, accuracy_named, simulate
+from raptor.condor.accuracy import accuracy_named
+from raptor.condor.simulate import Tissue, simulate
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.moulds.geometry import Mould

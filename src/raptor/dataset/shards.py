@@ -9,8 +9,9 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.condor.accuracy import accuracy_named
 from raptor.condor.lattice import Lattice, connect
-from raptor.condor.simulate import Tissue, accuracy_named
+from raptor.condor.simulate import Tissue
 from raptor.core.errors import RaptorError
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.design import Run

@@ -14,7 +14,8 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
-from raptor.condor.simulate import Tissue, accuracy_named, simulate
+from raptor.condor.accuracy import accuracy_named
+from raptor.condor.simulate import Tissue, simulate
 from raptor.core.blocks import Block, Name
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould

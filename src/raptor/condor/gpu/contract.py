@@ -15,12 +15,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from raptor.condor.accuracy import Accuracy, accuracy_named
 from raptor.condor.contract import CONTACT, steps_to
 from raptor.condor.gpu.agitate import agitate
 from raptor.condor.gpu.energy import cell_tension, inverted_fraction, objective, units
 from raptor.condor.gpu.layout import BLOCK, Batch, Cast, build_batch
 from raptor.condor.gpu.minimise import Goal, Minimiser
-from raptor.condor.simulate import Accuracy, Tissue, accuracy_named, undrifted
+from raptor.condor.simulate import Tissue, undrifted
 from raptor.condor.system import cast_state
 from raptor.core.errors import RaptorError
 from raptor.moulds.geometry import Mould

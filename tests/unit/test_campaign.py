@@ -114,9 +114,9 @@ def test_what_is_drawn_with_one_mould_has_one_split():
         ({"runs": 3, "edge": 4}, "edge .4. is more than runs"),
         ({"delta": [0.0, 0.95]}, "delta is .0.0, 0.95."),
         ({"kappa_nnn": [0.1, 0.2], "kappa_nnnn": [0.4, 0.5]}, "above kappa_nnn/sqrt"),
-        ({"moulds": "i_shape", "test": 3}, "are for moulds that are drawn"),
-        ({"repeat_of": "paper", "test": 3}, "are for moulds that are drawn"),
-        ({"selected_by": "film_unet", "test": 0, "edge": 2}, "edge is for runs that are drawn"),
+        ({"moulds": "i_shape", "test": 3}, "are for random moulds"),
+        ({"repeat_of": "paper", "test": 3}, "are for random moulds"),
+        ({"selected_by": "film_unet", "test": 0, "edge": 2}, "edge is for runs drawn at random"),
     ],
 )
 def test_keys_that_do_not_go_together_are_named(keys, message):

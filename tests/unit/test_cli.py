@@ -89,7 +89,7 @@ def test_draw_shows_converts_and_compares(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--output", "a.jpg"), "a.jpg is no picture's name; give one that ends in .png or .svg"),
+        (("--output", "a.jpg"), "a.jpg is not a picture's name; give one that ends in .png or .svg"),
         (("--output", "nowhere/a.png"), "folder nowhere does not exist"),
         (("--geojson", "a.svg"), "a.svg is not a GeoJSON file name"),
         (("--layers", 0), "layers is 0; 1 to 64 are allowed"),
@@ -130,7 +130,7 @@ def test_every_command_teaches_by_an_example():
             (MOULD, "--tissue", "glial_1", "--tissues", "none.yaml"),
             "none.yaml cannot be read",
         ),
-        ((MOULD, *options(), "--picture", "a.gif"), "a.gif is no picture's name"),
+        ((MOULD, *options(), "--picture", "a.gif"), "a.gif is not a picture's name"),
         (("none.geojson", *options()), "none.geojson does not exist"),
         ((MOULD, *options(delta=1.0)), "delta is 1.0; the model allows 0 <= delta < 1"),
         ((MOULD, *options(nnn=-1)), "kappa_nnn is -1.0; the model allows 0 <= kappa_nnn <= 1"),
@@ -298,7 +298,7 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
         (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
         (("--outline", MOULD), "is no picture that can be read: its content looks like JSON"),
-        (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is no picture's name"),
+        (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is not a picture's name"),
     ],
 )
 def test_bad_input_to_fit(arguments, message, tmp_path):

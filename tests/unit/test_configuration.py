@@ -122,7 +122,7 @@ def test_a_model_is_as_the_first_but_for_its_keys():
         ({"one": {"epoch": 3}}, "epoch"),
         ({"one": {}, "two": {"epochs": 0}}, "greater than or equal to 1"),
         ({"one": {}, "on": {"initial_weights": "off"}}, "initial_weights is 'off'; allowed are one, on"),
-        ({"one": {"initial_weights": "one"}}, "each of these waits for the next"),
+        ({"one": {"initial_weights": "one"}}, "each of these depends on the next"),
         ({"one": {}, "on": {"initial_weights": "one", "base_channels": 3}}, "on.base_channels differs"),
         ({"one": {}, "on": {"initial_weights": "one", "ensemble_size": 3}}, "on.ensemble_size is 3"),
         ({"one": {"campaigns": ["sweep"]}}, "sweep has no run to train on"),
@@ -155,7 +155,7 @@ def test_a_model_does_not_select_what_it_learns_from():
         "active": {"selected_by": "film_unet", "test": 0},
     }
     models = {"film_unet": {"campaigns": ["paper", "active"]}}
-    with pytest.raises(ValidationError, match="each of these waits for the next"):
+    with pytest.raises(ValidationError, match="each of these depends on the next"):
         Configuration.model_validate({"campaigns": campaigns, "models": models})
     models = {"film_unet": {}, "active": {"campaigns": ["paper", "active"], "initial_weights": "film_unet"}}
     config = Configuration.model_validate({"campaigns": campaigns, "models": models})

@@ -142,7 +142,7 @@ def test_a_mould_is_drawn_and_a_notebook_shows_it():
     figure = raptor.plot("small_rectangle")
     assert "26 x 13 l0" in figure.axes[0].get_title(loc="left")
     assert figure._repr_png_().startswith(b"\x89PNG")
-    with pytest.raises(raptor.RaptorError, match="there is no picture of type int"):
+    with pytest.raises(raptor.RaptorError, match="cannot draw an object of type int"):
         raptor.plot(3)
 
 
@@ -194,8 +194,8 @@ def test_a_fit_takes_an_outline_in_l0(mould):
         ({"area_ratio": 0.7, "outline": "a.png"}, "give one kind of measurement"),
         ({"area_ratio": 70}, "lies between 0 and 1.5"),
         ({"area_ratio": 0.7, "by": "eye"}, "allowed are surrogate, simulator"),
-        ({"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)}, "ask it too"),
-        ({"area_ratio": 0.7, "layers": 3}, "layers is 3, but this surrogate is of 7"),
+        ({"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)}, "start parameters need a fit by the simulator"),
+        ({"area_ratio": 0.7, "layers": 3}, "layers is 3, but this surrogate is for 7"),
         ({"area_ratio": 0.7, "surrogate": "nowhere"}, "model.json cannot be read"),
     ],
 )

@@ -147,9 +147,9 @@ def test_a_fit_of_nothing_measurable_is_named():
     def nothing(parameters):
         return np.full((len(parameters), 2), np.nan)
 
-    with pytest.raises(RaptorError, match="nothing of what was measured"):
+    with pytest.raises(RaptorError, match="none of the measured ratios"):
         fit(nothing, Target(None, 0.5), starts=16, seed=0)
-    with pytest.raises(RaptorError, match="where the search starts"):
+    with pytest.raises(RaptorError, match="at the start of the search"):
         descend_by_simulation(nothing, Target(None, 0.5).residuals, np.full(3, 0.5), 9)
 
 
@@ -269,7 +269,7 @@ def test_what_the_model_cannot_make_is_said():
     assert not summary["reachable"]
     nothing = surveyed()
     nothing.values[:, 1] = np.nan
-    with pytest.raises(RaptorError, match="cannot be measured everywhere"):
+    with pytest.raises(RaptorError, match="cannot be computed everywhere"):
         infer(nothing, Target(None, 0.5), 0, 0.01, 2**12)
     assert summarise(infer(nothing, Target(0.7, None), 0, 0.01, 2**12))["reachable"]
 
@@ -362,7 +362,7 @@ def test_an_outline_is_read_from_a_picture(tmp_path):
         assert found.length == pytest.approx(wanted.length, rel=0.02)
     for content, message in (
         (Image.new("L", (64, 32)), "crop it to the square frame"),
-        (Image.new("L", (64, 64)), "of one colour"),
+        (Image.new("L", (64, 64)), "has one colour"),
     ):
         content.save(tmp_path / "bad.png")
         with pytest.raises(RaptorError, match=message):

@@ -26,7 +26,7 @@ GRID = {"delta": [0.5], "kappa_nnn": [0.5], "ratio": [0.5]}
         ({"pixels": 100}, "pixels"),
         ({"random_moulds__cells": [100, 400000]}, "more than 2 layers hold"),
         ({"tradeoff__methods": ["perfect"]}, "accuracy is 'perfect'; allowed are draft"),
-        ({"tradeoff__methods": ["24 pixels"]}, "no whole part or multiple of pixels"),
+        ({"tradeoff__methods": ["24 pixels"]}, "neither a divisor nor a multiple of pixels"),
         (
             {"tradeoff__cases": {"one": CASE | {"dleta": 0.5}}},
             "'tradeoff.cases.one.dleta'; did you mean 'delta'?",

@@ -1,4 +1,4 @@
-"""Campaigns: everything that is simulated, by one chain of rules."""
+"""Campaigns: one chain of rules for everything that is simulated."""
 
 
 localrules:
@@ -6,7 +6,7 @@ localrules:
 
 
 rule record_configuration:
-    """Write the configuration as it was understood, defaults included, for the report."""
+    """Write the validated configuration, with defaults, for the report."""
     output:
         configuration=report(f"{RESULTS}/configuration.yaml", category="Configuration"),
     log:
@@ -23,7 +23,7 @@ rule record_configuration:
 
 
 rule compile_kernels:
-    """Compile the kernels once, before many jobs would do it at the same time."""
+    """Compile the kernels once, before jobs would compile them simultaneously."""
     output:
         kernels=f"{RESULTS}/kernels.json",
     log:
@@ -41,7 +41,7 @@ rule compile_kernels:
 
 
 rule design_campaign:
-    """Draw or read the moulds of a campaign, and choose parameters, seeds and split of every run."""
+    """Draw or read the moulds of a campaign; choose parameters, seed and split of every run."""
     input:
         moulds=lambda wildcards: list(CAMPAIGNS[wildcards.campaign].files().values()),
         repeated=lambda wildcards: (
@@ -78,7 +78,7 @@ rule design_campaign:
 
 
 rule simulate_shard:
-    """Simulate some runs of a campaign into one file."""
+    """Simulate a shard of a campaign: some runs, one file."""
     input:
         design=rules.design_campaign.output.design,
         moulds=rules.design_campaign.output.moulds,
@@ -104,7 +104,7 @@ rule simulate_shard:
 
 
 rule build_stack:
-    """Turn every simulation of a campaign into images of its fields, and measure its shape."""
+    """Rasterise every simulation of a campaign into images of its fields, and measure its shape."""
     input:
         design=rules.design_campaign.output.design,
         moulds=rules.design_campaign.output.moulds,
@@ -134,7 +134,7 @@ rule build_stack:
 
 
 rule list_examples:
-    """List every distinct image, under D4, of a campaign's training and validation samples."""
+    """List the distinct images under D4 of a campaign's training and validation samples."""
     input:
         stack=rules.build_stack.output.stack,
     output:
@@ -152,7 +152,7 @@ rule list_examples:
 
 
 rule check_campaign:
-    """Hold the files of a campaign against the rules of docs/data.md; any fault stops the workflow here."""
+    """Check the files of a campaign against the rules of docs/data.md; any fault stops the workflow."""
     input:
         design=rules.design_campaign.output.design,
         moulds=rules.design_campaign.output.moulds,
@@ -223,7 +223,7 @@ rule tabulate_campaign:
 
 
 rule check_splits:
-    """Make sure that no mould, turned or mirrored, stands in two splits of any campaigns."""
+    """Check that no mould, rotated or reflected, is in two splits of any campaigns."""
     input:
         stacks=expand(rules.build_stack.output.stack, campaign=CAMPAIGNS),
     output:
@@ -246,7 +246,7 @@ for campaign in CAMPAIGNS:
         name:
             f"campaign_{campaign}"
         input:
-            # Named one by one: Snakemake does not make a lost file again that no target asks for.
+            # Named one by one: Snakemake does not remake a lost file that no target asks for.
             expand(
                 [
                     *rules.design_campaign.output,
@@ -266,7 +266,7 @@ for campaign in CAMPAIGNS:
 
 
 rule campaigns:
-    """Every campaign, checked."""
+    """All campaigns, checked."""
     input:
         [getattr(rules, f"campaign_{campaign}").input for campaign in CAMPAIGNS],
         rules.record_configuration.output,

@@ -1,4 +1,4 @@
-"""Validation before anything runs, and what all rules share."""
+"""Validation before anything runs, and names shared by all rules."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Every figure, with the data that it draws beside it; no job here predicts or trains."""
+"""Figures, each with its data; no job here predicts or trains."""
 
 FIGURE = f"{RESULTS}/figures/{{figure}}"
 
@@ -123,7 +123,7 @@ for tissue in TISSUES:
 
 
 rule plot_tables:
-    """Draw a figure from tables: designs, errors, training, contraction, trade-off, what fits leave open."""
+    """Draw a figure from tables: designs, errors, training, contraction, trade-off, posteriors."""
     input:
         unpack(lambda wildcards: TABLE_FIGURES[wildcards.figure]["inputs"]),
     output:
@@ -165,7 +165,7 @@ use rule plot_tables as plot_fields with:
 
 
 rule plot_folding:
-    """Simulate one tissue as it contracts and folded by an anneal, and draw both."""
+    """Draw one tissue contracted and folded by an anneal."""
     input:
         mould=[find_mould(CASES[case].mould) for case in FOLDED],
         kernels=ancient(rules.compile_kernels.output.kernels),
@@ -193,7 +193,7 @@ rule plot_folding:
 
 
 rule studies:
-    """Every campaign over a grid: contraction, simulated and predicted, with its figures."""
+    """All campaigns over a grid: contraction, simulated and predicted, with figures."""
     input:
         expand(rules.tabulate_campaign.output, campaign=SWEEPS),
         expand(rules.compare_contraction.output, campaign=SWEEPS),
@@ -205,7 +205,7 @@ rule studies:
 
 
 rule tradeoff:
-    """Speed against accuracy, measured."""
+    """Speed against accuracy."""
     input:
         (
             [
@@ -229,7 +229,7 @@ rule fit:
 
 
 rule figures:
-    """Every figure."""
+    """All figures."""
     input:
         expand(f"{FIGURE}.png", figure=[*TABLE_FIGURES, *FIELD_FIGURES]),
         rules.plot_folding.output.png if FOLDED else [],

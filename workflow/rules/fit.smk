@@ -1,13 +1,13 @@
 """Fits of measured tissues."""
 
-# How fits simulate; every simulation that they make depends on this.
+# Settings of the simulations made by fits.
 SIMULATOR = {**CONFIG.simulator, "pixels": CONFIG.pixels, "seed": CONFIG.seed}
 FITTED = list(TISSUES)
 JOINT = CONFIG.fit.joint if MODELS else ()
 
 
 rule fit_tissue:
-    """Fit the three parameters to a tissue by the surrogate, correct them by a few simulations, simulate again."""
+    """Fit a tissue by the surrogate, correct the fit by a few simulations, and verify both."""
     input:
         mould=lambda wildcards: find_mould(TISSUES[wildcards.tissue].mould),
         weights=SURROGATE["weights"],
@@ -35,7 +35,7 @@ rule fit_tissue:
 
 
 rule fit_by_simulator:
-    """Fit a tissue by the simulator, from the corrected fit on, within a budget of simulations."""
+    """Fit a tissue by the simulator, from the corrected fit, within a budget of simulations."""
     input:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,
@@ -60,7 +60,7 @@ rule fit_by_simulator:
 
 
 rule infer_parameters:
-    """Posterior and profiles of a tissue's parameters; what a further measurement would tell."""
+    """Infer the posterior of a tissue's parameters, and rank further measurements."""
     input:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,
@@ -119,7 +119,7 @@ rule fit_joint:
 
 
 rule fit_outline:
-    """Fit a simulated tissue, whose parameters are known, by its ratios and by its whole outline."""
+    """Fit a simulated tissue with known parameters, by its ratios and by its whole outline."""
     input:
         tissue=rules.fit_tissue.output.tissue,
         mould=rules.fit_tissue.input.mould,
@@ -140,12 +140,12 @@ rule fit_outline:
         "../scripts/fit_outline.py"
 
 
-# Fits by the simulator, where it may make simulations.
+# Fits by the simulator, if it has a budget.
 BY_SIMULATOR = FITTED if CONFIG.fit.simulations else []
 
 
 rule tabulate_fits:
-    """All fits beside the paper's, as one table."""
+    """Collect all fits, with the paper's, in one table."""
     input:
         fits=expand(rules.fit_tissue.output.fit, tissue=FITTED),
         simulators=expand(rules.fit_by_simulator.output.fit, tissue=BY_SIMULATOR),

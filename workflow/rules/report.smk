@@ -1,4 +1,4 @@
-"""The report, and Snakemake's own, written when a run ends: a rule cannot write the report of its own workflow."""
+"""The report, and Snakemake's own, written at the end, since no rule can write its own workflow's report."""
 
 # Snakemake's --report-after-run would write it after dry runs too, and to one place for every
 # configuration. Here a stamp is the last thing that a run makes; that report follows it, and a
@@ -16,7 +16,7 @@ localrules:
 
 
 rule write_report:
-    """The report that is read from the top, with every figure and number inside."""
+    """Write the report: one file with every figure and number."""
     input:
         rules.record_configuration.output,
         rules.campaigns.input,
@@ -43,7 +43,7 @@ rule write_report:
 
 
 rule report:
-    """The reports, and all that they show."""
+    """Both reports and all that they show."""
     input:
         rules.write_report.input,
         rules.write_report.output,

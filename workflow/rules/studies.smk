@@ -5,7 +5,7 @@ FOLDED = [CONFIG.tradeoff.annealed[0]] if CONFIG.tradeoff.annealed else []
 
 
 rule predict_campaign:
-    """Predict area and width, with their bands, at every point of a campaign, and the fields that figures show."""
+    """Predict area and width with bands at every point of a campaign, and the fields shown in figures."""
     input:
         design=rules.design_campaign.output.design,
         moulds=rules.design_campaign.output.moulds,
@@ -25,7 +25,7 @@ rule predict_campaign:
 
 
 rule compare_contraction:
-    """Contraction of a campaign, simulated and predicted: the largest difference, and where it is."""
+    """Compare contraction, simulated and predicted: the largest difference and its position."""
     input:
         simulated=rules.tabulate_campaign.output.table,
         predicted=rules.predict_campaign.output.table if MODELS else [],
@@ -48,7 +48,7 @@ rule compare_contraction:
 
 
 rule measure_tradeoff:
-    """Cost and errors of each method on one mould and one set of parameters."""
+    """Measure cost and errors of each method on one mould and set of parameters."""
     input:
         mould=lambda wildcards: find_mould(CASES[wildcards.case].mould),
         surrogate=lambda wildcards: (
@@ -73,7 +73,7 @@ rule measure_tradeoff:
 
 
 rule tabulate_tradeoff:
-    """All cases as one table, and what they come to by method."""
+    """Collect all cases in one table, and summarise them by method."""
     input:
         cases=expand(rules.measure_tradeoff.output.table, case=CASES),
     output:

@@ -1,4 +1,4 @@
-"""Surrogates: training, and how good every model is on held-out simulations."""
+"""Surrogates: training, and errors on held-out simulations."""
 
 # The campaign by which fields are scaled and models are validated and tested, and those that only test.
 TRAINING = [CONFIG.training_campaign] if MODELS else []
@@ -30,7 +30,7 @@ rule fit_scaling:
 
 
 rule train_member:
-    """Train one network of a model; goes on from its checkpoint after an interruption."""
+    """Train one network of a model; resumes from its checkpoint after an interruption."""
     input:
         stacks=lambda wildcards: expand(
             rules.build_stack.output.stack, campaign=MODELS[wildcards.model].campaigns
@@ -75,7 +75,7 @@ rule train_member:
 
 
 rule assemble_model:
-    """Put the networks of a model together, and calibrate their spread on the validation split."""
+    """Assemble the networks of a model, and calibrate its bands on the validation split."""
     input:
         stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
         moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
@@ -112,7 +112,7 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The surrogate: the model by which tissues are fitted and drawn.
+# The surrogate: the model used for fits and figures.
 SURROGATE = {
     name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate or [])
     for name in ("weights", "model", "history")
@@ -120,13 +120,13 @@ SURROGATE = {
 
 
 rule train:
-    """Every model, trained."""
+    """All models, trained."""
     input:
         expand(rules.assemble_model.output, model=MODELS),
 
 
 rule measure_floor:
-    """Measure how far simulations of other seeds differ: what no prediction can beat."""
+    """Measure the noise floor: the differences between simulations with different seeds."""
     input:
         stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
         moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
@@ -147,11 +147,11 @@ rule measure_floor:
 
 
 rule evaluate_model:
-    """Errors of a model, or of a guess without a network, on the test runs of a campaign."""
+    """Evaluate a model, or a baseline without a network, on the test runs of a campaign."""
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.design_campaign.output.moulds,
-        # A baseline answers from the training split itself.
+        # A baseline predicts from the training split itself.
         training=expand(rules.build_stack.output.stack, campaign=TRAINING),
         examples=expand(rules.list_examples.output.examples, campaign=TRAINING),
         weights=lambda wildcards: (
@@ -173,7 +173,7 @@ rule evaluate_model:
 
 
 rule summarise_evaluation:
-    """Errors of a model on the test split, by region, on other campaigns, and in multiples of the floor."""
+    """Summarise a model's errors: test split, regions, other campaigns, over the noise floor."""
     input:
         metrics=lambda wildcards: expand(
             rules.evaluate_model.output.metrics,
@@ -207,7 +207,7 @@ ERRORS = {
 
 
 rule compare_models:
-    """Every model in one table: what it costs, and its errors in multiples of the noise floor."""
+    """Compare the cost and errors of all models in one table."""
     input:
         summaries=expand(
             rules.summarise_evaluation.output.summary, model=[*MODELS, *BASELINES]
@@ -234,7 +234,7 @@ rule compare_models:
 
 
 rule predict_samples:
-    """Predict the held-out samples that figures show: the one with the median error, and the worst."""
+    """Predict the held-out samples shown in figures: those with the median and the largest errors."""
     input:
         stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
         moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
@@ -254,7 +254,7 @@ rule predict_samples:
 
 
 rule ship_model:
-    """The surrogate as the package ships it: weights in half precision, and a model card."""
+    """Write the surrogate for the package: weights in half precision, and a model card."""
     input:
         **SURROGATE,
         summary=ERRORS["summary"],
@@ -279,7 +279,7 @@ rule ship_model:
 
 
 rule evaluate:
-    """The errors of every model."""
+    """The errors of all models."""
     input:
         (
             [

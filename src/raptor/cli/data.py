@@ -1,4 +1,4 @@
-"""What a data set holds and where it comes from: check, trace, same, progress, well, reference."""
+"""Commands on data sets: check, trace, same, progress, well, reference."""
 
 from functools import partial
 from pathlib import Path
@@ -12,9 +12,9 @@ from raptor.core.errors import RaptorError
 
 
 def progress(
-    folder: Annotated[Path, typer.Argument(help="results folder, for instance results/paper")],
+    folder: Annotated[Path, typer.Argument(help="results folder, such as results/paper")],
 ) -> None:
-    """Tell how many of a data set's simulations are done, at what rate, and the time left.
+    """Show how many simulations of a data set are done, at what rate, and the time left.
 
     Example:
       raptor progress results/paper
@@ -26,9 +26,9 @@ def progress(
 
 def well(
     stack: Annotated[Path, typer.Argument(help="fields.nc of a campaign")],
-    folder: Annotated[Path, typer.Argument(help="where data/train, data/valid and data/test are put")],
+    folder: Annotated[Path, typer.Argument(help="folder to write data/train, data/valid and data/test in")],
 ) -> None:
-    """Write a field stack in the HDF5 layout of The Well, one file a split.
+    """Write a field stack in the HDF5 layout of The Well, one file per split.
 
     Example:
       raptor well results/paper/campaigns/paper/fields.nc results/paper/well
@@ -46,10 +46,10 @@ def check(
     page: opt.Page = None,
     part: Annotated[
         float,
-        typer.Option(min=0, max=1, help="of a folder's simulations, chosen at random, to compute again"),
+        typer.Option(min=0, max=1, help="random share of a folder's simulations to recompute"),
     ] = 1.0,
 ) -> None:
-    """Hold a data set, a shard, a field stack or a mould against its rules; name every fault.
+    """Check a data set, a shard, a field stack or a mould against its rules; list every fault.
 
     Example:
       raptor check results/laptop
@@ -72,7 +72,7 @@ def trace(
     simulation: Annotated[int | None, typer.Option(help="simulation id")] = None,
     example: Annotated[int | None, typer.Option(help="row of examples.csv, from 0")] = None,
 ) -> None:
-    """Tell where a sample comes from: mould, parameters, seed, solver, package and model version.
+    """Show the provenance of a sample: mould, parameters, seed, solver, package and model version.
 
     Example:
       raptor trace results/laptop/campaigns/paper --simulation 7
@@ -93,7 +93,7 @@ def same(
     first: Annotated[Path, typer.Argument(help="results folder, or folder of a campaign")],
     second: Annotated[Path, typer.Argument(help="another one")],
 ) -> None:
-    """Say whether two results folders, or two campaigns, hold the same data: bit-equal but for times.
+    """Compare two results folders, or two campaigns, bit by bit, apart from times.
 
     Example:
       raptor same results/laptop results/again
@@ -110,7 +110,7 @@ def same(
 def reference(
     root: Annotated[Path, typer.Argument(help="the project's folder")] = Path(),
 ) -> None:
-    """Write what is generated from the configuration model: JSON schema and key table.
+    """Write the files generated from the configuration model: JSON schema, defaults and key table.
 
     Example:
       raptor reference .

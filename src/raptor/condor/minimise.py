@@ -371,7 +371,7 @@ def minimise(
     Raises
     ------
     RaptorError
-        Where the state does not fit the network or is not finite.
+        If the state does not fit the network or is not finite.
     """
     if state.size != 6 * network.cells or not np.isfinite(state).all():
         raise RaptorError("the state to minimise does not fit the network, or is not finite")

@@ -152,7 +152,7 @@ class Tissue:
         Raises
         ------
         RaptorError
-            Where the depression covers no pixel.
+            If the depression covers no pixel.
         """
         cast = self.cast_mould if pixels == PIXELS else CastMould(self.mould, self.layers, pixels)
         return labelled(
@@ -227,7 +227,7 @@ def simulate(
     Raises
     ------
     RaptorError
-        Where the mould cannot be read or holds no cell, or another argument is none that is allowed.
+        If the mould cannot be read or holds no cell, or another argument is none that is allowed.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The typed configuration: the blocks that the package works by, put together, and its reading."""
+"""The typed configuration, assembled from the blocks that the package uses, and its reader."""
 
 from raptor.config.configuration import Configuration
 from raptor.config.reading import load, parse, require_castable, require_measurable

@@ -1,4 +1,4 @@
-"""Blocks that say which models are trained and which tissues are fitted."""
+"""Configuration blocks of models and fits."""
 
 from pydantic import Field, model_validator
 
@@ -7,27 +7,27 @@ from raptor.surrogate.rules import ModelRules
 
 
 class Model(ModelRules):
-    """A model, and the campaigns that it learns from."""
+    """A model and the campaigns that it is trained on."""
 
     campaigns: tuple[Name, ...] = Field(
         ("paper",),
         min_length=1,
-        description="campaigns whose training runs it learns from; the first one also validates and tests it",
+        description="campaigns whose training runs it is trained on; the first also validates and tests it",
     )
 
 
 class Fit(Block):
-    """Which tissues are fitted, and how far the simulator takes part."""
+    """Which tissues are fitted, and the budget of simulations."""
 
     tissues_file: str | None = Field(
-        None, description="measured tissues and their moulds; null: those that come with the package"
+        None, description="measured tissues and their moulds; null: those of the package"
     )
     tissues: tuple[Name, ...] = Field(("glial_1",), description="tissues to fit, by name")
     joint: tuple[Name, ...] = Field(
-        (), description="tissues, two or more of those fitted, to fit together with common parameters too"
+        (), description="two or more of the fitted tissues, to fit also with common parameters"
     )
     simulations: int = Field(
-        24, ge=0, description="simulations that a fit by the simulator may make; 0: no such fit"
+        24, ge=0, description="largest number of simulations in a fit by the simulator; 0: no such fit"
     )
 
     @model_validator(mode="after")

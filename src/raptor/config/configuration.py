@@ -1,4 +1,4 @@
-"""The whole configuration: one model from which defaults, JSON schema and key table are made."""
+"""The whole configuration: one model that defines defaults, JSON schema and key table."""
 
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Literal
@@ -34,7 +34,7 @@ MODELS: dict[str, dict[str, Any]] = {
 
 
 class Configuration(Block):
-    """A run of the factory, from moulds to fitted tissues."""
+    """A run of the workflow, from moulds to fitted tissues."""
 
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
@@ -46,15 +46,15 @@ class Configuration(Block):
         "hooke", description="hooke: k (|l| - L'); literal: k L', the paper's formula"
     )
     accuracy: Literal["draft", "standard", "reference"] = Field(
-        "standard", description="of every simulation: draft, standard or reference"
+        "standard", description="accuracy of every simulation: draft, standard or reference"
     )
     pixels: Literal[16, 32, 64, 128, 256, 512] = Field(128, description="side of the square images of fields")
-    shard_size: Positive = Field(4, description="simulations a job and a file; does not change results")
+    shard_size: Positive = Field(4, description="simulations per job and file; does not change results")
     check_fraction: float = Field(
-        1.0, gt=0, le=1, description="share of the simulations, chosen at random, that checks compute again"
+        1.0, gt=0, le=1, description="random share of the simulations that checks recompute"
     )
     mould_scale: float = Field(
-        0.7, gt=0, le=1.1, description="moulds of the library are cast at this fraction of their size"
+        0.7, gt=0, le=1.1, description="library moulds are cast at this fraction of their size"
     )
     random_moulds: RandomMoulds = Field(default_factory=lambda: RandomMoulds())
     mould_families: MouldFamilies = Field(default_factory=lambda: MouldFamilies())
@@ -66,12 +66,12 @@ class Configuration(Block):
     models: dict[Name, Model] = Field(
         default_factory=lambda: dict(MODELS),
         validate_default=True,
-        description="models to train and compare, by name; what one does not state is as in the first. "
+        description="models to train and compare, by name; keys not given are as in the first. "
         "Empty: simulate only",
     )
     selected_model: Name | None = Field(
         None,
-        description="the surrogate: the model by which tissues are fitted and figures drawn; null: the first",
+        description="the surrogate: the model used for fits and figures; null: the first",
     )
     fit: Fit = Field(default_factory=lambda: Fit())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
@@ -102,13 +102,13 @@ class Configuration(Block):
         for pixels in self.tradeoff.rasters:
             if max(pixels, self.pixels) % min(pixels, self.pixels):
                 raise ValueError(
-                    f"tradeoff.methods has {pixels} pixels, no whole part or multiple of pixels "
+                    f"tradeoff.methods has {pixels} pixels, neither a divisor nor a multiple of pixels "
                     f"({self.pixels}); choose one that is"
                 )
         return self
 
     def _check_campaign(self, name: str, campaign: Campaign) -> None:
-        """What a campaign refers to is there."""
+        """Check that the campaigns and models that a campaign refers to exist."""
         if campaign.repeat_of is not None:
             repeated = self.campaigns.get(campaign.repeat_of)
             if repeated is None or repeated.repeat_of is not None:
@@ -121,7 +121,7 @@ class Configuration(Block):
             )
 
     def _check_model(self, name: str, model: Model) -> None:
-        """A model learns from campaigns that have what it needs, and goes on from one of its architecture."""
+        """Check that a model's campaigns have the splits it needs, and that initial weights fit it."""
         for campaign in model.campaigns:
             block = self.campaigns.get(campaign)
             if block is None:
@@ -161,7 +161,7 @@ class Configuration(Block):
             raise ValueError(f"models.{name}.campaigns: the first is not that of its initial_weights")
 
     def _order(self) -> None:
-        """Campaigns and models can be made one after another, without a circle."""
+        """Check that campaigns and models can be made one after another, without a cycle."""
         needs: dict[str, list[str]] = {}
         for name, campaign in self.campaigns.items():
             needs[f"campaigns.{name}"] = [f"models.{each}" for each in (campaign.selected_by,) if each]
@@ -171,20 +171,20 @@ class Configuration(Block):
         try:
             TopologicalSorter(needs).prepare()
         except CycleError as error:
-            raise ValueError(f"each of these waits for the next: {', '.join(error.args[1])}") from error
+            raise ValueError(f"each of these depends on the next: {', '.join(error.args[1])}") from error
 
     @property
     def surrogate(self) -> str | None:
-        """Name of the selected model; None without any."""
+        """Name of the selected model; None without models."""
         return self.selected_model or next(iter(self.models), None)
 
     @property
     def training_campaign(self) -> str | None:
-        """The campaign whose runs scale fields, validate models and test them; None without models."""
+        """The campaign that scales fields, validates models and tests them; None without models."""
         return next((model.campaigns[0] for model in self.models.values()), None)
 
     def design(self, campaign: str) -> Design:
-        """All that the design of a campaign depends on, other campaigns and models aside."""
+        """All that the design of a campaign depends on, apart from other campaigns and models."""
         block = self.campaigns[campaign]
         drawn_from = self.mould_families if block.kind == "families" else self.random_moulds
         return Design(
@@ -197,14 +197,14 @@ class Configuration(Block):
         )
 
     def simulations(self, campaign: str) -> int:
-        """Simulations of a campaign."""
+        """Number of simulations of a campaign."""
         block = self.campaigns[campaign]
         if block.repeat_of is None:
             return block.simulations()
         return block.simulations(self.campaigns[block.repeat_of].test_simulations())
 
     def shards(self, campaign: str) -> list[str]:
-        """Names of a campaign's shards: the first and the last simulation of each."""
+        """Names of a campaign's shards: the first and last simulation of each."""
         count, size = self.simulations(campaign), self.shard_size
         return [f"{first:05d}-{min(first + size, count) - 1:05d}" for first in range(0, count, size)]
 
@@ -215,11 +215,11 @@ class Configuration(Block):
 
     @property
     def simulator(self) -> dict[str, Any]:
-        """How tissues are simulated: all that a simulation depends on beside mould, parameters and seed."""
+        """All that a simulation depends on, apart from mould, parameters and seed."""
         return self.model_dump(mode="json", include={"layers", "shells", "tension", "accuracy"})
 
     def trial(self, case: str) -> dict[str, Any]:
-        """All that the comparison of methods on a case depends on beside the methods and its mould's file."""
+        """All that the comparison on a case depends on, apart from the methods and the mould's file."""
         chosen = self.tradeoff.cases[case].model_dump(mode="json")
         simulator = self.model_dump(mode="json", include={"layers", "shells", "tension", "pixels", "seed"})
         alike = chosen["layers"] in (None, self.layers)
@@ -228,7 +228,7 @@ class Configuration(Block):
 
     @property
     def compares_surrogate(self) -> bool:
-        """Whether there is a surrogate to compare with methods of simulation."""
+        """Whether a surrogate is compared with methods of simulation."""
         return bool(self.models) and SURROGATE in self.tradeoff.methods
 
     def fingerprint(self, stage: Literal["design", "simulation", "fields"], campaign: str) -> str:
@@ -261,7 +261,7 @@ class Configuration(Block):
 
 
 def _completed(models: dict[str, Any]) -> dict[str, Any]:
-    """Models, what one does not state being as in the first."""
+    """Models, with keys not given taken from the first."""
     blocks = {name: block if block is not None else {} for name, block in models.items()}
     if not all(isinstance(block, dict) for block in blocks.values()):
         return blocks

@@ -20,7 +20,7 @@ def parse(content: Any, where: str) -> Configuration:
     Raises
     ------
     RaptorError
-        One sentence a fault; an unknown key is named with its nearest known one.
+        One sentence per fault; an unknown key is named with its nearest known one.
     """
     try:
         return Configuration.model_validate(content)
@@ -34,12 +34,12 @@ def load(path: Path) -> Configuration:
 
 
 def require_castable(configuration: Configuration) -> None:
-    """Find out before any work that every mould that is named can be read and cast.
+    """Check before any work that every named mould can be read and cast.
 
     Raises
     ------
     RaptorError
-        Where one cannot.
+        If one cannot.
     """
     for name, campaign in configuration.campaigns.items():
         try:
@@ -52,12 +52,12 @@ def require_castable(configuration: Configuration) -> None:
 
 
 def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float) -> None:
-    """Find out before any work that the moulds of tissues can be cast, and their widths measured.
+    """Check before any work that the moulds of tissues can be cast, and their widths measured.
 
     Raises
     ------
     RaptorError
-        Where one cannot.
+        If one cannot.
     """
     for name, tissue in tissues.items():
         if not tissue.measured:
@@ -70,5 +70,5 @@ def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float
         if tissue.width_ratio is not None and not central_section(mould).intersects(mould.depression):
             raise RaptorError(
                 f"tissue {name}: a width ratio is given, but tethers fill the central section of "
-                f"{tissue.mould}; leave the width out or change the mould"
+                f"{tissue.mould}; omit the width or change the mould"
             )

@@ -1,4 +1,4 @@
-"""What is generated from the configuration model: JSON schema, defaults, key table."""
+"""Files generated from the configuration model: JSON schema, defaults, key table."""
 
 import json
 from collections.abc import Mapping
@@ -17,9 +17,9 @@ DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about
 """
 README_HEAD = """# Configuration
 
-`laptop.yaml` is the default; another file, such as `paper.yaml`, states only what differs and is chosen by
-`workflow/env snakemake --cores all --configfile config/paper.yaml`. Unknown keys are errors. Everything
-simulated is an entry of `campaigns`; a new study is one more entry:
+`laptop.yaml` is the default. Another file, such as `paper.yaml`, states only what differs; choose it with
+`--configfile config/paper.yaml`. Unknown keys are errors. Every simulation belongs to an entry of
+`campaigns`; a new study is one more entry:
 
 ```yaml
 campaigns:
@@ -29,14 +29,14 @@ campaigns:
     seeds: 2
 ```
 
-This page and `laptop.yaml` are generated from the blocks that the package works by, with
-`workflow/env raptor reference`.
+`workflow/env raptor reference` generates this page and `laptop.yaml` from the configuration model in
+`src/raptor`.
 
 """
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON schema, as it stands in workflow/schemas."""
+    """The JSON schema, as in workflow/schemas."""
     return Configuration.model_json_schema()
 
 
@@ -46,7 +46,7 @@ def write_reference(root: Path) -> list[Path]:
     Raises
     ------
     RaptorError
-        Where the folder is not the project's.
+        If the folder is not the project's.
     """
     if not (root / "config").is_dir() or not (root / "workflow").is_dir():
         raise RaptorError(f"{root.resolve()} has no config/ and workflow/; give the project's folder")
@@ -63,7 +63,7 @@ def write_reference(root: Path) -> list[Path]:
 
 
 def stated_defaults() -> dict[str, Any]:
-    """The default configuration; of campaigns and models only what differs from theirs."""
+    """The default configuration; for campaigns and models only what differs from their defaults."""
     content = Configuration().model_dump(mode="json")
     for name in ("campaigns", "models"):
         block = _block_of(name)
@@ -95,7 +95,7 @@ def key_table() -> str:
 
 
 def _block_of(name: str) -> type[BaseModel] | None:
-    """The block of a key, or of each of its entries; None where it is a plain value."""
+    """The block of a key, or of each of its entries; None for a plain value."""
     annotation = Configuration.model_fields[name].annotation
     kinds = (annotation, *get_args(annotation))
     return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
@@ -107,7 +107,7 @@ def _row(name: str, value: Any, description: str | None) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it; of entries their names."""
+    """A value in the types of JSON; entries as their names."""
     if isinstance(value, Mapping):
         return list(value)
     return list(value) if isinstance(value, tuple) else value

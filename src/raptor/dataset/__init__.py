@@ -1,1 +1,1 @@
-"""The data set: design, shards of simulations, field stack, examples, scaling, card, checks."""
+"""Data sets: campaigns, shards of simulations, field stacks, examples, scaling, cards, checks."""

@@ -1,7 +1,7 @@
-"""Campaigns: which moulds are simulated, at which parameters, how often, and who is held out.
+"""Campaigns: which moulds are simulated at which parameters, how often, and which runs are held out.
 
-Every random choice about a run comes from (root seed, name of the campaign, number of the draw) alone, so it
-does not depend on batches, threads, retries or other campaigns.
+Every random choice about a run derives from (root seed, name of the campaign, number of the draw), so it does
+not depend on batches, threads, retries or other campaigns.
 """
 
 import hashlib
@@ -31,14 +31,14 @@ DRAWN: dict[str, Callable[[Any, np.random.Generator, int, str], Mould]] = {
     "long_bars": long_bars,
     "slender_strips": slender_strips,
 }
-"""Kinds of mould that are drawn, by the word that a configuration has for them."""
-CANDIDATES = 8  # draws of which a model chooses one
+"""Kinds of random moulds, by their name in a configuration."""
+CANDIDATES = 8  # draws from which a model selects one
 ATTEMPTS = 10_000
 
 Base = tuple[Sequence[Run], Mapping[str, Mould]]
 """Runs and moulds of a campaign that another one repeats."""
 Score = Callable[[Mould, CellParameters], float]
-"""How much a model would learn from a run."""
+"""Expected value of a run for training a model."""
 
 
 class Grid(Block):
@@ -76,20 +76,19 @@ class Campaign(Block):
         "random",
         min_length=1,
         description="random, families: drawn by random_moulds or mould_families; long_bars, slender_strips: "
-        "drawn unlike the random ones; or names of library moulds, mould files or folders of them, one or "
-        "a list",
+        "drawn unlike the random ones; or library moulds, mould files or folders of them, one or a list",
     )
     repeat_of: Name | None = Field(
         None, description="campaign whose test runs are simulated again with other seeds: the noise floor"
     )
     selected_by: Name | None = Field(
-        None, description=f"model that chooses the runs, of {CANDIDATES} times as many, by disagreement"
+        None, description=f"model that selects the runs, from {CANDIDATES} times as many, by disagreement"
     )
     runs: Positive = Field(
         24, description="moulds drawn, parameters drawn for moulds given, or test runs repeated"
     )
     test: int | None = Field(None, ge=0, description="runs held out for evaluation; null: all")
-    validation: int = Field(0, ge=0, description="runs that choose the best weights and calibrate")
+    validation: int = Field(0, ge=0, description="runs for choosing the best weights and for calibration")
     edge: int = Field(0, ge=0, description="runs with delta at one of the two ends of its range")
     seeds: Positive = Field(1, description="simulations of each run or point of a grid")
     delta: tuple[float, float] = Field(
@@ -105,19 +104,19 @@ class Campaign(Block):
     )
     grid: Grid | None = Field(
         None,
-        description="delta, kappa_nnn and ratio (kappa_nnnn/kappa_nnn): values at every combination of which "
-        "each mould is simulated, in place of the ranges",
+        description="delta, kappa_nnn and ratio (kappa_nnnn/kappa_nnn): each mould is simulated at every "
+        "combination of these values, instead of the ranges",
     )
 
     @property
     def kind(self) -> str | None:
-        """A key of `DRAWN`, or None where moulds are given or another campaign's."""
+        """A key of `DRAWN`, or None for given moulds and for those of another campaign."""
         named = isinstance(self.moulds, str) and self.moulds in DRAWN and self.repeat_of is None
         return str(self.moulds) if named else None
 
     @property
     def tests(self) -> int:
-        """Runs that are held out."""
+        """Number of runs held out."""
         return self.runs if self.test is None else self.test
 
     @model_validator(mode="after")
@@ -142,21 +141,21 @@ class Campaign(Block):
                 f"kappa_nnn up to {self.kappa_nnn[1]}; lower kappa_nnnn or raise kappa_nnn"
             )
         if self.selected_by and self.edge:
-            raise ValueError("edge is for runs that are drawn, not for those that a model selects")
+            raise ValueError("edge is for runs drawn at random, not for those that a model selects")
         if self.kind is None and (self.test is not None or self.validation or self.selected_by):
             raise ValueError(
-                "test, validation and selected_by are for moulds that are drawn; runs on moulds that are "
-                "given, or repeated, are all held out"
+                "test, validation and selected_by are for random moulds; runs on given moulds, and "
+                "repeated runs, are all held out"
             )
         return self
 
     def files(self) -> dict[str, Path]:
-        """Files of the moulds that are given, by name.
+        """Files of the given moulds, by name.
 
         Raises
         ------
         RaptorError
-            Where a name is neither a mould's nor a file's, a folder holds none, or two have one name.
+            If a name is neither a mould's nor a file's, a folder holds none, or two have one name.
         """
         if self.kind or self.repeat_of:
             return {}
@@ -168,7 +167,7 @@ class Campaign(Block):
         return found
 
     def simulations(self, repeated: int = 0) -> int:
-        """Simulations in all; `repeated` are the test simulations of the campaign that it repeats.
+        """Number of simulations; `repeated` is that of the test simulations of the campaign it repeats.
 
         Raises
         ------
@@ -181,17 +180,17 @@ class Campaign(Block):
         return (given if given and self.grid else self.runs) * points * self.seeds
 
     def test_simulations(self, repeated: int = 0) -> int:
-        """Simulations that are held out; raises as `files` does."""
+        """Number of simulations held out; raises as `files` does."""
         whole = self.simulations(repeated)
         return whole if self.kind is None else whole // self.runs * self.tests
 
     def draw_parameters(self, rng: np.random.Generator, *, edge: bool = False) -> CellParameters:
-        """Delta uniform, or at an end; both kappas uniform over the bounded region (paper).
+        """Delta uniform, or at an end of its range; both kappas uniform over the bounded region (paper).
 
         Raises
         ------
         RaptorError
-            Where the ranges allow no kappa_nnnn <= kappa_nnn/sqrt(2).
+            If the ranges allow no kappa_nnnn <= kappa_nnn/sqrt(2).
         """
         delta, kappa_nnn, kappa_nnnn = (Bounds(*r) for r in (self.delta, self.kappa_nnn, self.kappa_nnnn))
         drawn = rng.uniform(delta.lower, delta.upper)
@@ -208,7 +207,7 @@ class Campaign(Block):
 
 
 def _mould_files(name: str) -> list[Path]:
-    """The file of a mould, or those of a folder."""
+    """The file of a mould, or the mould files of a folder."""
     if not Path(name).is_dir():
         return [find_mould(name)]
     paths = sorted(path for path in Path(name).iterdir() if path.suffix.lower() in SUFFIXES)
@@ -219,7 +218,7 @@ def _mould_files(name: str) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Draw:
-    """A mould, the parameters at which it is simulated, and the seeds, one a simulation."""
+    """A mould, the parameters at which it is simulated, and the seeds, one per simulation."""
 
     number: int
     mould: Mould
@@ -228,7 +227,7 @@ class _Draw:
 
 
 class Design(Block):
-    """All that the design of a campaign depends on; None where it does not matter to its kind of moulds."""
+    """All that the design of a campaign depends on; None if irrelevant to its kind of moulds."""
 
     name: Name
     seed: int
@@ -248,16 +247,16 @@ class Design(Block):
         Parameters
         ----------
         base
-            Of the campaign that it repeats.
+            Runs and moulds of the campaign that it repeats.
         score
-            By which the model that selects its runs values them.
+            Of the model that selects its runs.
         on_progress
-            Told of each candidate that was valued.
+            Called for each candidate scored.
 
         Raises
         ------
         RaptorError
-            Where the bounds allow no mould or no parameters.
+            If the bounds allow no mould or no parameters.
         """
         campaign = self.campaign
         if campaign.repeat_of is not None:
@@ -284,12 +283,12 @@ class Design(Block):
         return [replace(run, simulation=number) for number, run in enumerate(runs)], moulds
 
     def _stream(self, *numbers: int) -> SeedSequence:
-        """A stream of random numbers of the campaign's own."""
+        """A random stream of the campaign's own."""
         own = int.from_bytes(hashlib.sha256(self.name.encode()).digest()[:8])
         return SeedSequence([self.seed, own, *numbers])
 
     def _draws(self, count: int) -> list[_Draw]:
-        """So many drawn moulds, or all that are given, with parameters and seeds."""
+        """A number of random moulds, or all given ones, with parameters and seeds."""
         campaign = self.campaign
         given = [self._read(name, path) for name, path in campaign.files().items()]
         count = len(given) if given and campaign.grid else count
@@ -305,7 +304,7 @@ class Design(Block):
         return draws
 
     def _read(self, name: str, path: Path) -> Mould:
-        """A mould that is given, under the name of its file; standard moulds at the configured scale."""
+        """A given mould, named after its file; library moulds at the configured scale."""
         return replace(read_at_scale(path, self.mould_scale or 1.0), name=name)
 
     def _draw_mould(self, stream: SeedSequence, number: int) -> Mould:
@@ -316,7 +315,7 @@ class Design(Block):
     def _select(
         self, score: Score | None, on_progress: Callable[[int], None]
     ) -> tuple[list[_Draw], dict[int, dict[str, str]]]:
-        """Of many draws those that a model values most, and by how much, by number of the draw."""
+        """The highest-scoring of many draws, with their scores, by number of the draw."""
         if score is None:
             raise RaptorError(f"{self.name} is selected by {self.campaign.selected_by}; its score is needed")
         draws, scores = self._draws(CANDIDATES * self.campaign.runs), []
@@ -327,7 +326,7 @@ class Design(Block):
         return [draws[n] for n in chosen], {int(n): {"disagreement": repr(scores[n])} for n in chosen}
 
     def _repeat(self, runs: Sequence[Run], moulds: Mapping[str, Mould]) -> tuple[list[Run], list[Mould]]:
-        """Test runs, chosen at random, each again with other seeds."""
+        """Randomly chosen test runs, each repeated with other seeds."""
         test = [run for run in runs if run.split == "test"]
         order = np.random.default_rng(self._stream(1)).permutation(len(test))[: self.campaign.runs]
         chosen = [test[place] for place in sorted(order)]
@@ -339,7 +338,7 @@ class Design(Block):
         return again, list({run.mould: moulds[run.mould] for run in chosen}.values())
 
     def _splits(self) -> list[str]:
-        """The split of each run; what is drawn with one mould has one split."""
+        """The split of each run; all runs of one draw have the same split."""
         campaign = self.campaign
         names = np.full(max(campaign.runs, len(campaign.files())), "train", dtype=object)
         if campaign.kind is None:
@@ -357,5 +356,5 @@ class Design(Block):
 
 
 def _seeds(stream: SeedSequence, count: int) -> list[int]:
-    """Seeds of simulations, of 53 bits, so that every tool reads them exactly."""
+    """Seeds of simulations, of 53 bits, which every tool reads exactly."""
     return [int(state >> np.uint64(11)) for state in stream.generate_state(count, np.uint64)]

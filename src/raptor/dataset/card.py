@@ -1,4 +1,4 @@
-"""The card of a campaign: what the data set is, generated from the data set itself."""
+"""The card of a campaign, generated from its data."""
 
 import os
 import platform
@@ -31,8 +31,8 @@ the pixel.
 | --- | --- | --- |
 {split_rows}
 
-Moulds by symmetry: {symmetry}. Distinct images a simulation of train and validation: {distinct}.
-Cells a tissue: {cells}. Images: {pixels} x {pixels} pixels.
+Moulds by symmetry: {symmetry}. Distinct images per simulation of train and validation: {distinct}.
+Cells per tissue: {cells}. Images: {pixels} x {pixels} pixels.
 
 ## Fields
 | field | meaning |
@@ -40,7 +40,7 @@ Cells a tissue: {cells}. Images: {pixels} x {pixels} pixels.
 {field_rows}
 
 ## Parameter ranges
-| parameter | least | median | largest |
+| parameter | smallest | median | largest |
 | --- | --- | --- | --- |
 {parameter_rows}
 
@@ -50,9 +50,9 @@ outline are walls that cells cannot enter; the gel is free between floor and fil
 accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 
 ## Cost
-{hours:.3f} {unit} in all; {median:.2f} s a simulation in the median, {p95:.2f} s at the 95th
-percentile, {where}. Not converged: {unconverged} of {simulations}. Inverted bonds: at
-most {inverted:.1e} of a tissue's. Simulations of the design that failed and are missing: {missing}.
+{hours:.3f} {unit} in all; per simulation {median:.2f} s (median), {p95:.2f} s (95th percentile),
+{where}. Not converged: {unconverged} of {simulations}. Inverted bonds: at most {inverted:.1e}
+of a tissue's. Simulations of the design that failed and are missing: {missing}.
 
 ## How to evaluate another simulator against it
 Simulate the moulds of `moulds.geojson` at the parameters of `design.csv`, rasterise as above, and compare
@@ -107,7 +107,7 @@ def card(
         unit="core-hours" if shard.device == "cpu" else "hours of a GPU",
         where=f"on one core of {platform.machine()} with {os.cpu_count()} cores"
         if shard.device == "cpu"
-        else "each a share, by evaluations and cells, of a batch's time on the GPU",
+        else "each as a share, by evaluations and cells, of its batch's time on the GPU",
         unconverged=unconverged,
         missing="; ".join(f"{n} ({reason})" for n, reason in sorted(failures.items())) or "none",
         inverted=inverted,

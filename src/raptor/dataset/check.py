@@ -1,6 +1,6 @@
 """`raptor check`: the rules that every file of a data set must satisfy (docs/data.md).
 
-Each check yields faults, one sentence each; a data set without faults yields none.
+Each check yields faults, one sentence each.
 """
 
 import json
@@ -33,24 +33,24 @@ from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32
-WALL_YIELD = 0.1  # l0; how far a soft wall gives way
+WALL_YIELD = 0.1  # l0; depth to which a soft wall yields
 
 
 def check(path: Path, fraction: float = 1.0, read: Callable[[Path], Mould] = read_mould) -> list[str]:
     """Check a results folder, a campaign's folder, or a file: shard, stack, prediction, table, moulds.
 
     A file of one mould, of any format, is read by `read`.
-    Energy, tension and fields of a folder are computed again for a random `fraction` of its simulations.
+    Energy, tension and fields of a folder are recomputed for a random `fraction` of its simulations.
 
     Returns
     -------
     list of str
-        One sentence a fault; empty where all is well.
+        One sentence per fault; empty if there is none.
 
     Raises
     ------
     RaptorError
-        Where there is nothing at the path that can be checked.
+        If there is nothing at the path that can be checked.
     """
     path = Path(path)
     if path.is_dir():
@@ -73,7 +73,7 @@ def check(path: Path, fraction: float = 1.0, read: Callable[[Path], Mould] = rea
 
 
 def _cast_moulds(path: Path, read: Callable[[Path], Mould]) -> None:
-    """Read a file's moulds, and cast two layers of each: a mould without cells is of no use."""
+    """Read a file's moulds, and cast two layers of each to find moulds without cells."""
     is_table = path.suffix.lower() == ".geojson" and len(read_features(path)) > 1
     is_table = is_table and all("mould" in (each.get("properties") or {}) for each in read_features(path))
     for mould in read_moulds(path) if is_table else [read(path)]:
@@ -81,7 +81,7 @@ def _cast_moulds(path: Path, read: Callable[[Path], Mould]) -> None:
 
 
 def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
-    """What reading a file finds wrong with it."""
+    """Faults found in reading a file."""
     try:
         read(path)
     except RaptorError as error:
@@ -90,7 +90,7 @@ def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
 
 
 def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
-    """Every campaign of a results folder, or the one whose folder it is."""
+    """Every campaign of a results folder, or the one campaign of its own folder."""
     campaigns = campaign_folders(folder)
     for name, path in campaigns.items():
         yield from (f"{name}: {fault}" for fault in check_campaign(path, fraction))
@@ -103,12 +103,12 @@ def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
 
 
 def check_campaign(folder: Path, fraction: float = 1.0) -> Iterator[str]:
-    """All files of a campaign's folder, against the rules and against each other.
+    """All files of a campaign's folder, against the rules and each other.
 
     Raises
     ------
     RaptorError
-        Where the design, the moulds or the stack are missing.
+        If the design, the moulds or the stack are missing.
     """
     stack = folder / "fields.nc"
     runs, moulds = read_design(folder / "design.csv"), moulds_by_id(folder / "moulds.geojson")
@@ -124,7 +124,7 @@ def check_campaign(folder: Path, fraction: float = 1.0) -> Iterator[str]:
 
 
 def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
-    """Ids and seeds are unique; every mould is found, and in one split."""
+    """Ids and seeds are unique; every mould exists and has one split."""
     for what, values in (
         ("simulation id", [str(run.simulation) for run in runs]),
         ("seed", [str(run.seed) for run in runs]),
@@ -141,11 +141,11 @@ def check_design(runs: list[Run], moulds: dict[str, Mould]) -> Iterator[str]:
 
 
 def check_splits(stacks: Mapping[str, Path]) -> Iterator[str]:
-    """No mould, in any of its eight images, stands in two splits, within the stacks or between them.
+    """No mould, in any of its eight images, is in two splits, within or between the stacks.
 
     Stacks by campaign.
     """
-    first_seen: dict[bytes, tuple[str, str]] = {}  # not masks: they would all stay in memory
+    first_seen: dict[bytes, tuple[str, str]] = {}  # hashes, because masks would fill the memory
     for campaign, path in stacks.items():
         table = read_table(path)
         for mould, split, masks in zip(table.mould, table.split, read_masks(path), strict=True):
@@ -154,14 +154,14 @@ def check_splits(stacks: Mapping[str, Path]) -> Iterator[str]:
                 there, other = first_seen.setdefault(image, (here, split))
                 if other != split:
                     yield (
-                        f"{here} ({split}) is the mould of {there} ({other}), as it is or turned or "
-                        "mirrored: one mould in two splits"
+                        f"{here} ({split}) is the mould of {there} ({other}), up to rotation and reflection: "
+                        "one mould in two splits"
                     )
                     break
 
 
 def check_result(path: Path) -> Iterator[str]:
-    """The file of one tissue: its fields and masks, and of a simulated one its cells."""
+    """The file of one tissue: its fields and masks, and its cells if simulated."""
     with open_file(path) as file:
         yield from _check_variables(file, Path(path).name)
         fields = np.stack([file[name][:] for name in FIELDS])
@@ -173,7 +173,7 @@ def check_result(path: Path) -> Iterator[str]:
 
 
 def check_shard(path: Path, chosen: set[int] | None = None, group: str | None = None) -> Iterator[str]:
-    """Energy and tension recomputed from positions and orientations are the stored ones.
+    """Stored energy and tension equal those recomputed from positions and orientations.
 
     Of the `chosen` simulations, or of all; of a file, or of the group of one.
     """
@@ -207,11 +207,11 @@ def _check_record(record: Record, shard: Shard, file: str) -> Iterator[str]:
     tension = cell_tension(record.state, lattice, delta, shard.model.tension)
     worst = np.abs(tension - record.tension).max()
     if worst > RELATIVE * np.abs(tension).max() + 1e-5:
-        yield f"{where}: tension differs from the recomputed by up to {worst:.3g}"
+        yield f"{where}: tension differs from the recomputed one by up to {worst:.3g}"
 
 
 def check_stack(path: Path) -> Iterator[str]:
-    """Invariants of fields and masks; no mould, in any of its eight images, in two splits."""
+    """Invariants of fields and masks; no mould, in any of its eight images, is in two splits."""
     with open_file(path) as file:
         yield from _check_variables(file, Path(path).name, images=False)
         yield from _check_field_names(file, Path(path).name)
@@ -227,9 +227,9 @@ def _check_field_names(file: Any, name: str) -> Iterator[str]:
 
 
 def _check_variables(file: Any, name: str, *, images: bool = True) -> Iterator[str]:
-    """Attributes of the file and its variables, and that every number is finite.
+    """Attributes of the file and its variables; every number is finite.
 
-    Without `images` the stack's large variables are left to the check of each sample.
+    Without `images` the stack's large variables are skipped; the check of each sample covers them.
     """
     for attribute in ("title", "source", "history", "references", "configuration"):
         if not hasattr(file, attribute):
@@ -277,9 +277,9 @@ def _check_fields(
 def check_against_shards(
     stack: Path, shards: list[Path], runs: list[Run], moulds: dict[str, Mould], chosen: set[int]
 ) -> Iterator[str]:
-    """Fields, masks and parameters of a stack are those of the simulations it was made from.
+    """Fields, masks and parameters of a stack agree with its simulations.
 
-    Every simulation is looked for; those `chosen` are computed again.
+    Every simulation is looked up; those `chosen` are recomputed.
     """
     table = read_table(stack)
     rows = {int(simulation): row for row, simulation in enumerate(table.simulation)}
@@ -294,7 +294,7 @@ def check_against_shards(
         try:
             shard = read_shard(path)
         except RaptorError:
-            continue  # named by check_shard
+            continue  # reported by check_shard
         for record in shard.records:
             uncovered.discard(record.simulation)
             run = by_id.get(record.simulation)
@@ -318,11 +318,11 @@ def _compare(sample: Sample, record: Record, run: Run, mould: Mould, layers: int
         yield f"{where}: mould, split, cells, seed or parameters differ between design, shard and stack"
     cast = CastMould(mould, layers, sample.fields.shape[-1])
     if (cast.depression != sample.depression).any() or (cast.tethers != sample.tethers).any():
-        yield f"{where}: its masks are not those of mould {run.mould}"
+        yield f"{where}: its masks do not agree with mould {run.mould}"
     fields = record_fields(record, sample.fields.shape[-1])
     ratios = shape_ratios(sample.fields[0], cast)
     if not np.allclose(ratios, (sample.area_ratio, sample.width_ratio), equal_nan=True):
-        yield f"{where}: area and width ratio are not those of its density"
+        yield f"{where}: area and width ratio do not agree with its density"
     for name, stored_field, field in zip(FIELDS, sample.fields, fields, strict=True):
         if np.abs(stored_field - field).max() <= RELATIVE * np.abs(field).max():
             continue
@@ -333,7 +333,7 @@ def _compare(sample: Sample, record: Record, run: Run, mould: Mould, layers: int
 
 
 def check_examples(path: Path, stack: Path) -> Iterator[str]:
-    """Examples exist, are listed once, and come from no test sample."""
+    """Examples exist, are listed once, and are not from test samples."""
     split = read_table(stack).split
     try:
         examples = read_examples(path)
@@ -350,7 +350,7 @@ def check_examples(path: Path, stack: Path) -> Iterator[str]:
 
 
 def _check_scaling(path: Path, stacks: Mapping[str, Path]) -> Iterator[str]:
-    """The constants are those of the training split that they name."""
+    """The constants agree with the training split that they name."""
     try:
         campaign, scaling = json.loads(path.read_text())["campaign"], read_scaling(path)
         wanted = training_scaling(stacks[campaign])
@@ -359,4 +359,4 @@ def _check_scaling(path: Path, stacks: Mapping[str, Path]) -> Iterator[str]:
         return
     for ours, theirs in ((scaling.offset, wanted.offset), (scaling.scale, wanted.scale)):
         if not np.allclose(ours, theirs, rtol=1e-6, equal_nan=True):
-            yield f"{path.name}: the constants are not those of the training split of {campaign}"
+            yield f"{path.name}: the constants do not agree with the training split of {campaign}"

@@ -14,7 +14,7 @@ TABLES = ("design.csv", "moulds.geojson", "examples.csv")
 
 
 def differences(first: Path, second: Path) -> list[str]:
-    """What differs between two results folders or two campaigns, one sentence each; empty for the same data.
+    """Differences between two results folders or two campaigns, one sentence each.
 
     Ordered by simulation id, every variable but wall_time must be bit-equal, and every table
     equal. Histories and times may differ.
@@ -22,7 +22,7 @@ def differences(first: Path, second: Path) -> list[str]:
     Raises
     ------
     RaptorError
-        Where a folder holds no campaign, or a file of one is missing.
+        If a folder holds no campaign, or a file of one is missing.
     """
     if all((Path(folder) / "design.csv").is_file() for folder in (first, second)):
         return _campaign_differences(Path(first), Path(second))

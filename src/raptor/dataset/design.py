@@ -1,4 +1,4 @@
-"""The table of a campaign: one row a run, with its mould, split, parameters and seed."""
+"""The table of a campaign: one row per run, with its mould, split, parameters and seed."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ COLUMNS = ("simulation", "mould", "split", "delta", "kappa_nnn", "kappa_nnnn", "
 class Run:
     """One row of a design: a simulation to be made.
 
-    `own` holds what else the campaign says of it, by column.
+    `own` holds the campaign's own columns.
     """
 
     simulation: int
@@ -29,7 +29,7 @@ class Run:
 
 
 def write_design(path: Path, runs: Sequence[Run]) -> None:
-    """Write a design as CSV; the campaign's own columns stand last."""
+    """Write a design as CSV, the campaign's own columns last."""
     own = list(dict.fromkeys(name for run in runs for name in run.own))
     with atomic_path(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -47,7 +47,7 @@ def read_design(path: Path) -> list[Run]:
     Raises
     ------
     RaptorError
-        Where the file is missing, lacks a column, or a value in it makes no sense.
+        If the file is missing, lacks a column, or contains an invalid value.
     """
     path = Path(path)
     if not path.is_file():

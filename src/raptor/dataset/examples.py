@@ -1,4 +1,4 @@
-"""Augmentation by D4: which images of which samples are examples for training."""
+"""Augmentation by D4: the images of samples that are examples for training."""
 
 import csv
 from collections.abc import Iterable, Sequence
@@ -29,10 +29,10 @@ def mould_images(masks: NDArray[np.uint8]) -> list[bytes]:
 
 
 def list_examples(stack: Path, splits: Iterable[str] = ("train", "validation")) -> list[Example]:
-    """Every distinct image of every sample: a copy whose mould image equals an earlier is left out.
+    """Every distinct image of every sample, without images whose mould equals an earlier one.
 
-    Moulds are compared with all earlier ones, not only with their own images, so an image that
-    two moulds share is listed once.
+    Moulds are compared with all earlier ones, not only with their own images, so an image shared by two
+    moulds is listed once.
     """
     seen: set[bytes] = set()
     examples, rows = [], set(read_table(stack).rows(*splits))
@@ -49,8 +49,8 @@ def join_examples(
 ) -> tuple[list[Example], list[str]]:
     """Examples of several stacks as one list, and the splits of all their samples.
 
-    Rows are counted through the stacks, as `ExampleSet` counts them. Of all but the first the training split
-    alone is taken: one campaign validates.
+    Rows are numbered consecutively through the stacks, as in `ExampleSet`. Only the first stack contributes a
+    validation split.
     """
     joined: list[Example] = []
     splits: list[str] = []
@@ -68,7 +68,7 @@ def training_scaling(stack: Path) -> Scaling:
     Raises
     ------
     RaptorError
-        Where the stack has no training sample.
+        If the stack has no training sample.
     """
     low, high = np.full(len(FIELDS), np.inf), np.full(len(FIELDS), -np.inf)
     for sample in read_samples(stack, read_table(stack).rows("train")):
@@ -93,7 +93,7 @@ def read_examples(path: Path) -> list[Example]:
     Raises
     ------
     RaptorError
-        Where the file is missing or malformed.
+        If the file is missing or malformed.
     """
     try:
         lines = decoded(Path(path).read_bytes(), f"examples {path}").splitlines()

@@ -21,7 +21,7 @@ REFERENCES = (
 
 @contextmanager
 def create(path: Path, title: str, configuration: str) -> Iterator[netCDF4.Dataset]:
-    """Create a netCDF-4 file whole or not at all, with the attributes that every file has.
+    """Create a netCDF-4 file atomically, with the attributes common to all files.
 
     `configuration` is the hash of the configuration block that the file depends on.
     """
@@ -31,7 +31,7 @@ def create(path: Path, title: str, configuration: str) -> Iterator[netCDF4.Datas
 
 
 def header(title: str, configuration: str) -> dict[str, Any]:
-    """The attributes that every file has; `configuration` as `create` takes it."""
+    """The attributes common to all files; `configuration` as in `create`."""
     return {
         "Conventions": "CF-1.11",
         "title": title,

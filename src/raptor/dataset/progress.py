@@ -1,4 +1,4 @@
-"""How far campaigns are: done, failed, rate, time left."""
+"""Progress of campaigns: done, failed, rate, time left."""
 
 import time
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from raptor.dataset.design import read_design
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.shards import campaign_folders, read_failures, shard_paths
 
-WINDOW = 1800.0  # s over which the rate is taken
+WINDOW = 1800.0  # s over which the rate is averaged
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Counts of simulations, and simulations a second over the last half hour."""
+    """Counts of simulations, and simulations per second over the last half hour."""
 
     designed: int
     done: int
@@ -22,7 +22,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float:
-        """Until all are done, at this rate; infinite where nothing was done lately."""
+        """Time until all are done at this rate; infinite if nothing was done lately."""
         left = self.designed - self.done - self.failed
         if left == 0:
             return 0.0
@@ -37,12 +37,12 @@ class Progress:
 
 
 def progress_of(folder: Path) -> Progress:
-    """Look at a results folder, or at a campaign's, finished or being made.
+    """Progress of a results folder or a campaign's folder, finished or not.
 
     Raises
     ------
     RaptorError
-        Where it has no design, or a shard cannot be read.
+        If it has no design, or a shard cannot be read.
     """
     campaigns = campaign_folders(folder).values()
     designed = sum(len(read_design(path / "design.csv")) for path in campaigns)

@@ -1,4 +1,4 @@
-"""Where a sample comes from: the way back from an image to mould, parameters, seed, solver and versions."""
+"""Provenance of a sample: from an image back to mould, parameters, seed, solver and versions."""
 
 from pathlib import Path
 from typing import Any
@@ -19,16 +19,16 @@ from raptor.symmetry import Element
 MADE_BY = (
     "source", "model_version", "solver", "accuracy", "device", "layers", "shells", "tension", "configuration",
 )  # fmt: skip
-"""Attributes that say what made a file."""
+"""Attributes that record how a file was made."""
 
 
 def trace_example(folder: Path, example: int) -> dict[str, Any]:
-    """Where a row of examples.csv comes from: its element of D4, and its simulation's trace.
+    """Provenance of a row of examples.csv: its element of D4 and its simulation.
 
     Raises
     ------
     RaptorError
-        Where there is no such row, or a file on the way is missing.
+        If there is no such row, or a file on the way is missing.
     """
     examples = read_examples(folder / "examples.csv")
     if not 0 <= example < len(examples):
@@ -42,12 +42,12 @@ def trace_example(folder: Path, example: int) -> dict[str, Any]:
 
 
 def trace_simulation(folder: Path, simulation: int) -> dict[str, Any]:
-    """Where a simulation's fields come from, as plain values; files by their place in the campaign's folder.
+    """Provenance of a simulation's fields, as plain values; files relative to the campaign's folder.
 
     Raises
     ------
     RaptorError
-        Where the design does not have the simulation, or a file on the way is missing.
+        If the design does not have the simulation, or a file on the way is missing.
     """
     folder = Path(folder)
     runs = {run.simulation: run for run in read_design(folder / "design.csv")}
@@ -74,7 +74,7 @@ def _describe(feature: dict[str, Any]) -> dict[str, Any]:
 
 
 def _trace_shard(folder: Path, simulation: int) -> dict[str, Any]:
-    """The shard that holds a simulation, what made it, and how the simulation ended."""
+    """The shard that holds a simulation, how it was made, and how the simulation ended."""
     for path in shard_paths(folder):
         place = f"shards/{path.name}"
         failures = read_failures(path)

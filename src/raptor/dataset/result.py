@@ -1,7 +1,7 @@
-"""The file of one tissue, simulated or predicted: its fields, and all that is needed to draw them again.
+"""The file of one tissue, simulated or predicted: its fields and all that is needed to draw them.
 
-The fields are those of `raptor.fields.labelled`; what was simulated has its cells besides, in the group
-`cells`, which is a shard of one simulation (docs/data.md).
+The fields are those of `raptor.fields.labelled`. A simulated tissue has its cells too, in the group `cells`,
+which is a shard of one simulation (docs/data.md).
 """
 
 from pathlib import Path
@@ -23,7 +23,7 @@ PACKED = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
 class Result(Protocol):
-    """What can be saved: a simulated tissue or a prediction."""
+    """A simulated tissue or a prediction."""
 
     @property
     def mould(self) -> Mould:
@@ -31,19 +31,19 @@ class Result(Protocol):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What it comes to, by name."""
+        """Its numbers, by name."""
 
     def to_dataset(self) -> xr.Dataset:
-        """All of it that is an image or a number."""
+        """Its images and numbers."""
 
 
 def save(result: Result, path: str | Path) -> None:
-    """Write a tissue or a prediction as netCDF, whole or not at all.
+    """Write a tissue or a prediction as netCDF, atomically.
 
     Raises
     ------
     RaptorError
-        Where the place cannot be written.
+        If the file cannot be written.
     """
     fields = result.to_dataset()
     method = fields.attrs["method"]
@@ -77,6 +77,6 @@ def load_fields(path: str | Path) -> xr.Dataset:
         raise RaptorError(f"{path} {why_unreadable(path, error)}") from error
     if "mould" not in fields.attrs:
         raise RaptorError(
-            f"{path} does not hold the fields of one tissue; give one that raptor simulate or predict wrote"
+            f"{path} does not hold the fields of one tissue; give a file from raptor simulate or predict"
         )
     return fields

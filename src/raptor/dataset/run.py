@@ -1,4 +1,4 @@
-"""Simulating the runs of a design, on the processor or on a GPU."""
+"""Simulation of the runs of a design, on the processor or on a GPU."""
 
 import logging
 import os
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("raptor")
 
-FEW = 16  # runs that are cast without further processes
+FEW = 16  # largest number of runs cast in a single process
 
 
 def simulate_shard(
@@ -34,10 +34,10 @@ def simulate_shard(
 ) -> tuple[dict[int, Tissue], dict[int, str]]:
     """Simulate runs; returns simulations and reasons of failure, by id.
 
-    On the processor one after another; on a GPU many at once, where the accuracy contracts and does no
-    more. A run that fails is tried once more on the processor, then given up, and the others go on. Want of
-    memory or disk is no run's fault and is raised, for the workflow to try the whole shard again.
-    `on_progress` is told of each run its simulation or the reason why there is none.
+    One after another on the processor; many at once on a GPU, if the accuracy only contracts. A run that
+    fails is tried once more on the processor and then given up, and the others continue. Lack of memory or
+    disk is not a fault of a run and is raised, so that the workflow tries the whole shard again.
+    `on_progress` gets each run's simulation or the reason for its failure.
     """
     simulations, failures = {}, {}
     if device != "cpu" and accuracy_named(accuracy).contracts_alone:
@@ -46,7 +46,7 @@ def simulate_shard(
         if run.simulation in simulations:
             continue
         outcome = _simulate(run, moulds, model, accuracy)
-        if isinstance(outcome, str):  # once more: not every cause of a failure stays
+        if isinstance(outcome, str):  # once more: the cause may be transient
             outcome = _simulate(run, moulds, model, accuracy)
         if isinstance(outcome, str):
             failures[run.simulation] = outcome
@@ -64,7 +64,7 @@ def _simulate(run: Run, moulds: dict[str, Mould], model: NetworkModel, accuracy:
         log.exception("simulation %d failed", run.simulation)
         return f"{type(error).__name__}: {error}"
     if not _is_finite(made):
-        return "the solver met numbers that are not finite"
+        return "the solver met NaN or infinity"
     return made
 
 
@@ -76,8 +76,8 @@ def _simulate_together(
     device: str,
     on_progress: Callable[[Run, Tissue | str], None],
 ) -> dict[int, Tissue]:
-    """Simulations of runs in one batch, by id; without those that cannot be cast or do not stay finite."""
-    import torch  # here: a job on the processor need not wait for it
+    """Simulations of runs in one batch, by id, without those that cannot be cast or do not stay finite."""
+    import torch  # here, because jobs on the processor do without it
 
     from raptor.condor.gpu.contract import BatchSolver, Task
 
@@ -94,7 +94,7 @@ def _simulate_together(
 
 
 def _cast_all(moulds: list[Mould], model: NetworkModel) -> list["Cast | None"]:
-    """Moulds cast for a batch, None where one cannot be; many by all processors, before a GPU is touched."""
+    """Moulds cast for a batch, None for those that cannot be; in parallel, before the GPU is used."""
     if len(moulds) <= FEW:
         return [_cast(mould, model) for mould in moulds]
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
@@ -107,7 +107,7 @@ def _cast(mould: Mould, model: NetworkModel) -> "Cast | None":
     try:
         return cast(mould, model)
     except RaptorError:
-        return None  # said again, and recorded, when the processor tries
+        return None  # recorded when the processor tries again
 
 
 def _is_finite(simulation: Tissue) -> bool:

@@ -1,7 +1,7 @@
-"""Scaling of fields to [-1, 1] by constants of the training split alone, and back.
+"""Scaling of fields to [-1, 1] and back, by constants of the training split alone.
 
-The constants commute with D4: sxsx and sysy share theirs, and so do sxsz and sysz; what can change
-sign is scaled symmetrically about zero.
+The scaling commutes with D4: sxsx and sysy share constants, and so do sxsz and sysz; fields of either sign
+are scaled symmetrically about zero.
 """
 
 import json
@@ -24,7 +24,7 @@ INPUTS = ("depression", "tethers", "delta", "kappa_nnn", "kappa_nnnn")
 
 @dataclass(frozen=True)
 class Scaling:
-    """scaled = (value - offset) / scale, and value = scaled * scale + offset, a field."""
+    """Per field, scaled = (value - offset) / scale and value = scaled * scale + offset."""
 
     offset: tuple[float, ...]
     scale: tuple[float, ...]
@@ -44,12 +44,12 @@ class Scaling:
         return offset, scale
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in `normalisation.json` and beside weights."""
+        """As stored in `normalisation.json` and model.json."""
         return {"fields": list(FIELDS), **asdict(self)}
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> "Scaling":
-        """Read back what `as_json` gave."""
+        """The inverse of `as_json`."""
         return cls(tuple(content["offset"]), tuple(content["scale"]))
 
 
@@ -100,7 +100,7 @@ def read_scaling(path: Path) -> Scaling:
     Raises
     ------
     RaptorError
-        Where the file is missing or incomplete.
+        If the file is missing or incomplete.
     """
     try:
         return Scaling.from_json(json.loads(Path(path).read_text(encoding="utf-8")))

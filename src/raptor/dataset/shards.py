@@ -21,11 +21,11 @@ from raptor.parameters import PARAMETERS, CellParameters, NetworkModel
 RESULTS = {
     "energy": "energy of the bonds, walls excluded, in kappa0 l0^2",
     "wall_energy": "energy of the walls, in kappa0 l0^2",
-    "contact_energy": "energy of the contacts that keep bonds from reversing, in kappa0 l0^2",
-    "gradient": "largest gradient left, contacts included, by position or by orientation over delta "
+    "contact_energy": "energy of the contacts that keep bonds from inverting, in kappa0 l0^2",
+    "gradient": "largest residual gradient, contacts included, by position or by orientation over delta "
     "(at least 0.02), in kappa0 l0",
-    "converged": "1 where the gradient fell below the solver's tolerance times delta (at least 0.02)",
-    "inverted_fraction": "share of bonds whose direction reversed since casting",
+    "converged": "1 if the gradient fell below the solver's tolerance times delta (at least 0.02)",
+    "inverted_fraction": "share of bonds whose direction has reversed since casting",
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",
 }
@@ -39,7 +39,7 @@ CELL_VARIABLES = {
 
 @dataclass(frozen=True)
 class Record:
-    """One simulation as read back from a shard; arrays as in `Tissue`."""
+    """One simulation read from a shard; arrays as in `Tissue`."""
 
     simulation: int
     parameters: CellParameters
@@ -55,17 +55,17 @@ class Record:
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """Positions and orientations as one array (6 * cells,), as the energy takes them."""
+        """Positions and orientations as one array (6 * cells,), as for the energy."""
         return np.concatenate([self.positions.T.ravel(), self.orientation.T.ravel()])
 
     def lattice(self, model: NetworkModel) -> Lattice:
-        """The bonds, built again from the cast positions."""
+        """The bonds, rebuilt from the cast positions."""
         return connect(self.sites, self.parameters, model)
 
 
 @dataclass(frozen=True)
 class Shard:
-    """The simulations of one file, the model that made them, and why others failed, by id."""
+    """The simulations of one file, their model, and the reasons of failures, by id."""
 
     records: list[Record]
     model: NetworkModel
@@ -85,7 +85,7 @@ def write_shard(
     failures: dict[int, str] | None = None,
     device: str = "cpu",
 ) -> None:
-    """Write the simulations of runs, by id, made on a device, as one shard, whole or not at all."""
+    """Write the simulations of runs, by id, as one shard, atomically."""
     failures = failures or {}
     with create(path, "CONDOR simulations of tissues in tethered moulds", configuration) as file:
         made = [run for run in runs if run.simulation in simulations]
@@ -99,7 +99,7 @@ def write_shard(
 
 
 def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str, device: str) -> None:
-    """State as attributes what anyone needs to compute the simulations again."""
+    """Write as attributes what is needed to recompute the simulations."""
     file.shells = np.array(model.shells, dtype=np.int32)
     file.layers = np.int32(model.layers)
     file.tension = model.tension
@@ -109,7 +109,7 @@ def write_model(file: netCDF4.Dataset, model: NetworkModel, accuracy: str, devic
 
 
 def write_simulations(file: netCDF4.Dataset, runs: Sequence[Run], simulations: Sequence[Tissue]) -> None:
-    """Write the simulations of runs and their cells into a file, or a group of one, that is still empty."""
+    """Write the simulations of runs and their cells into an empty file or group."""
     file.featureType = "point"
     file.createDimension("simulation", len(runs))
     file.createDimension("cell", sum(s.cells for s in simulations))
@@ -144,12 +144,12 @@ def _columns(simulation: Tissue) -> NDArray[np.float64]:
 
 
 def campaign_folders(folder: Path) -> dict[str, Path]:
-    """Folders of the campaigns of a results folder, by name; of a campaign's own folder that one.
+    """Folders of the campaigns of a results folder, by name, or the one campaign of its own folder.
 
     Raises
     ------
     RaptorError
-        Where the folder is neither.
+        If the folder is neither.
     """
     folder = Path(folder)
     if (folder / "design.csv").is_file():
@@ -163,12 +163,12 @@ def campaign_folders(folder: Path) -> dict[str, Path]:
 
 
 def shard_paths(folder: Path) -> list[Path]:
-    """Shards of a campaign's folder; not those that are being written, whose names begin with a dot."""
+    """Shards of a campaign's folder, without those being written, whose names begin with a dot."""
     return sorted((Path(folder) / "shards").glob("[0-9]*.nc"))
 
 
 def read_failures(path: Path, configuration: str | None = None) -> dict[int, str]:
-    """Why simulations of a shard failed, by id; raises as `read_shard` does."""
+    """Reasons of failed simulations of a shard, by id; raises as `read_shard` does."""
     with _open_shard(path, configuration) as file:
         return _read_failures(file)
 
@@ -195,12 +195,12 @@ def _open_shard(path: Path, configuration: str | None, group: str | None = None)
 
 
 def read_shard(path: Path, configuration: str | None = None, group: str | None = None) -> Shard:
-    """Read a shard, or the group of a file that is one; with `configuration`, only one of that configuration.
+    """Read a shard or the group of a file that is one; with `configuration`, require that configuration.
 
     Raises
     ------
     RaptorError
-        Where the file is missing, cut short, incomplete, or of another configuration or model.
+        If the file is missing, truncated, incomplete, or of another configuration or model.
     """
     with _open_shard(path, configuration, group) as file:
         try:

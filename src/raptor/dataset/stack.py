@@ -1,4 +1,4 @@
-"""The field stack: every simulation as eight images beside its mould, in physical units."""
+"""The field stack: every simulation as eight images with its mould, in physical units."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from raptor.symmetry import FIELDS
 
 @dataclass(frozen=True)
 class Sample:
-    """One sample of a stack: fields (8, y, x), masks (y, x), measures, and where it comes from."""
+    """One sample of a stack: fields (8, y, x), masks (y, x), measures and provenance."""
 
     fields: NDArray[np.float32]
     depression: NDArray[np.uint8]
@@ -46,7 +46,7 @@ def record_fields(record: Record, pixels: int, device: str = "cpu") -> NDArray[n
     cells = (record.positions, record.orientation, record.tension)
     if device == "cpu":
         return rasterise(*cells, pixels).astype(np.float32)
-    import torch  # here: without a GPU the stack is built without it
+    import torch  # here, because without a GPU it is not needed
 
     from raptor.condor.gpu.raster import rasterise as rasterise_on
 
@@ -65,15 +65,15 @@ def build_stack(
     device: str = "cpu",
     on_progress: Callable[[int], None] = lambda sample: None,
 ) -> None:
-    """Rasterise every simulation of the shards, on a device, into one file, sample by sample.
+    """Rasterise every simulation of the shards into one file, sample by sample.
 
     Simulations that failed are left out; attribute `missing` names them.
 
     Raises
     ------
     RaptorError
-        Where a shard is missing, cut short, of another configuration or made on another device, a
-        simulation of the design is in none of them, or all of a split failed.
+        If a shard is missing, truncated, of another configuration or from another device, a simulation of
+        the design is in none of them, or all of a split failed.
     """
     shards = list(shards)
     failed = _failed(shards, runs, simulation_configuration)
@@ -88,15 +88,15 @@ def build_stack(
             shard = read_shard(shard_path, simulation_configuration)
             if getattr(file, "device", shard.device) != shard.device:
                 raise RaptorError(
-                    f"shard {shard_path} was made on another device than those before it; delete the shards "
+                    f"shard {shard_path} was made on another device than earlier ones; delete the shards "
                     "of one device and run the workflow again"
                 )
-            write_model(file, shard.model, shard.accuracy, shard.device)  # the same of all
+            write_model(file, shard.model, shard.accuracy, shard.device)  # the same for all
             for record in shard.records:
                 if record.simulation not in left:
                     raise RaptorError(
-                        f"shard {shard_path} holds simulation {record.simulation}, which the design "
-                        "does not have or another shard has too; delete it and run the workflow again"
+                        f"shard {shard_path} holds simulation {record.simulation}, which is not in the "
+                        "design or is in another shard too; delete it and run the workflow again"
                     )
                 left.remove(record.simulation)
                 run = by_id[record.simulation]
@@ -109,7 +109,7 @@ def build_stack(
 
 
 def _sample(record: Record, run: Run, mould: CastMould, fields: NDArray[np.float32]) -> Sample:
-    """A simulation as images (8, y, x), with what is measured of them and where it comes from."""
+    """A simulation as images (8, y, x), with its measures and provenance."""
     area_ratio, width_ratio = shape_ratios(fields[0], mould)
     return Sample(
         fields=fields,
@@ -128,13 +128,13 @@ def _sample(record: Record, run: Run, mould: CastMould, fields: NDArray[np.float
 
 
 def _failed(shards: list[Path], runs: Sequence[Run], configuration: str) -> set[int]:
-    """Simulations that failed."""
+    """Failed simulations."""
     failed = {simulation for path in shards for simulation in read_failures(path, configuration)}
     for split in dict.fromkeys(run.split for run in runs):
         if all(run.simulation in failed for run in runs if run.split == split):
             raise RaptorError(
-                f"every simulation of the split '{split}' failed; see the logs of simulate_shard for why, "
-                "mend the design, and run the workflow again"
+                f"every simulation of the split '{split}' failed; see the logs of simulate_shard, correct "
+                "the campaign, and run the workflow again"
             )
     return failed
 
@@ -150,22 +150,22 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         variable(file, axis, (axis,), centres, f"pixel centre {axis}, in l0")
     along = ("sample",)
     image, plane = (1, len(FIELDS), pixels, pixels), (1, pixels, pixels)
-    # Every reader of netCDF has zlib; level 1 is as fast to read as any, and 3 % larger than level 4
-    # (docs/factory.md). Nothing is rounded: sums over pixels stay exact.
+    # Every netCDF reader has zlib; level 1 reads as fast as any and is 3 % larger than level 4
+    # (docs/factory.md). Nothing is rounded, so sums over pixels stay exact.
     packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True}
     columns = {
         "fields": ("f4", ("sample", "field", "y", "x"), "fields, per pixel", {"chunksizes": image} | packed),
-        "depression": ("u1", ("sample", "y", "x"), "1 where cells may be", {"chunksizes": plane} | packed),
-        "tethers": ("u1", ("sample", "y", "x"), "1 where a tether stands", {"chunksizes": plane} | packed),
+        "depression": ("u1", ("sample", "y", "x"), "1 where cells may lie", {"chunksizes": plane} | packed),
+        "tethers": ("u1", ("sample", "y", "x"), "1 where there is a tether", {"chunksizes": plane} | packed),
         **{name: ("f8", along, text, {}) for name, text in PARAMETERS.items()},
         "simulation": ("i4", along, "simulation id", {}),
         "seed": ("i8", along, "seed of the simulation's random stream", {}),
         "mould": (str, along, "mould id", {}),
         "split": (str, along, "train, validation or test", {}),
         "n_cells": ("i4", along, "number of cells", {}),
-        "converged": ("i1", along, "1 where the simulation met its solver's tolerance", {}),
+        "converged": ("i1", along, "1 if the simulation met its solver's tolerance", {}),
         "area_ratio": ("f8", along, "A/A0", {}),
-        "width_ratio": ("f8", along, "w/w0; NaN where the central section holds no material", {}),
+        "width_ratio": ("f8", along, "w/w0; NaN if the central section holds no material", {}),
     }  # fmt: skip
     for name, (kind, dimensions, long_name, options) in columns.items():
         made = file.createVariable(name, cast(Any, kind), dimensions, **options)
@@ -180,7 +180,7 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
 
 @dataclass(frozen=True)
 class StackTable:
-    """What a stack holds besides its images, one entry a sample."""
+    """The contents of a stack other than its images, one entry per sample."""
 
     simulation: NDArray[np.int32]
     mould: list[str]
@@ -205,12 +205,12 @@ class StackTable:
 
 
 def read_table(path: Path) -> StackTable:
-    """Read what a stack holds besides its images.
+    """Read the contents of a stack other than its images.
 
     Raises
     ------
     RaptorError
-        Where the file is missing or is no stack.
+        If the file is missing or not a stack.
     """
     with open_file(path) as file:
         try:
@@ -230,7 +230,7 @@ def read_table(path: Path) -> StackTable:
 
 
 def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
-    """Read samples one at a time; never more than one in memory."""
+    """Read samples one at a time, with one in memory."""
     with open_file(path) as file:
         for row in rows:
             yield Sample(

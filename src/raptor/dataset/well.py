@@ -1,9 +1,9 @@
-"""The field stack in the HDF5 layout of The Well, for the tools that read it.
+"""Export of field stacks to the HDF5 layout of The Well.
 
 R. Ohana et al., The Well (2024), arXiv:2412.00568; layout: docs/data_format.md of its repository. One
-file a split; a simulation is a trajectory of one time step. Axes are (trajectory, time, x, y): our images
-are [y, x]. In the plane the products of orientations are a tensor (sxsx, sxsy, sysy), a vector (sxsz,
-sysz) and a scalar (szsz), and are stored as such.
+file per split; a simulation is a trajectory of one time step. Axes are (trajectory, time, x, y), where ours
+are [y, x]. In the plane the orientation products form a tensor (sxsx, sxsy, sysy), a vector (sxsz, sysz)
+and a scalar (szsz).
 """
 
 from collections.abc import Iterable
@@ -33,7 +33,7 @@ def write_well(stack: Path, folder: Path) -> list[Path]:
     Raises
     ------
     RaptorError
-        Where the stack cannot be read.
+        If the stack cannot be read.
     """
     table = read_table(stack)
     written = []

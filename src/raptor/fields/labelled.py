@@ -66,7 +66,7 @@ def labelled(
     Raises
     ------
     RaptorError
-        Where the depression covers no pixel.
+        If the depression covers no pixel.
     """
     import xarray as xr  # here: what only simulates need not wait for it
 
@@ -104,7 +104,7 @@ def mould_of(dataset: "xr.Dataset") -> Mould:
     Raises
     ------
     RaptorError
-        Where it names none.
+        If it names none.
     """
     try:
         feature = json.loads(dataset.attrs["mould"])

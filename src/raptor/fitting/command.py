@@ -1,4 +1,4 @@
-"""A fit as a user asks for it: ratios or an outline, by the surrogate or by the simulator."""
+"""Fits as a user asks for them: to ratios or an outline, by the surrogate or the simulator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -35,33 +35,33 @@ from raptor.surrogate.command import load_surrogate
 from raptor.surrogate.inference import Surrogate
 
 By = Literal["surrogate", "simulator"]
-"""What a fit asks."""
+"""The model used by a fit."""
 
 OUTLINE_ERROR = 0.25
 LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
-CORRECTED = 4  # the part of simulations that correct the surrogate's fit is one over this
+CORRECTED = 4  # one in so many simulations may be used to correct the surrogate's fit
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval
 
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for.
+    """A request for a fit.
 
     Parameters
     ----------
     mould : Mould
     target : Target or Outline
-        What was measured.
+        The measurement.
     simulator : Simulator
     surrogate : Surrogate or None
-        None where the simulator starts from `start`.
+        None if the simulator starts from `start`.
     start : CellParameters or None
     by_simulator : bool
-        Whether the simulator goes on from the surrogate's fit or the start.
+        Whether the simulator continues from the surrogate's fit or from the start.
     simulations : int
-        That it may make.
+        Largest number of simulations.
     error : float or None
-        Standard error of a ratio, or of the outline in l0; None for the usual one.
+        Standard error of a ratio, or of the outline in l0; None for the default.
     """
 
     mould: Mould
@@ -75,13 +75,13 @@ class Request:
 
     @property
     def threshold(self) -> float:
-        """Density per pixel above which there is tissue, as what the fit ends with gives densities."""
+        """Density per pixel above which there is tissue, for the model that ends the fit."""
         if self.surrogate is not None and not self.by_simulator:
             return self.surrogate.threshold
         return density_threshold(self.simulator.model.layers, self.simulator.pixels)
 
     def measure(self, densities: Densities, ratios: Measure, threshold: float) -> tuple[Measure, Residuals]:
-        """What is measured of tissues, and what the fit makes small of it."""
+        """The measured quantities and their residuals."""
         if isinstance(self.target, Outline):
             return outline_measure(densities, self.target, threshold), np.asarray
         return ratios, self.target.residuals
@@ -107,33 +107,33 @@ def fit(
     error: float | None = None,
     seed: int = 0,
 ) -> FittedTissue:
-    """Fit delta, kappa_nnn and kappa_nnnn to a tissue in its mould, and say what is left open.
+    """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Two ratios cannot determine three parameters: the intervals are those of the valley (docs/fits.md). For
-    ratios they are those of the posterior by the surrogate, for an outline those that its slope at the fit
-    gives.
+    Two ratios cannot determine three parameters; the intervals show what they leave open (docs/fits.md). For
+    ratios the intervals are those of the surrogate's posterior, for an outline they follow from the
+    derivatives at the fit.
 
     Parameters
     ----------
     mould : Mould, str or Path
-        A mould, or what `read_mould` reads: a name of the library, or a file.
+        A mould, or a library name or file for `read_mould`.
     area_ratio, width_ratio : float, optional
         Measured A/A0 and w/w0, one or both.
     outline : shapely Polygon or MultiPolygon, str or Path, optional
-        The tissue's outline (l0), such as `measure` finds it, in place of ratios; or a picture of it, cropped
-        to the frame of 62.5 l0.
+        The tissue's outline (l0), such as from `measure`, instead of ratios; or a picture of it, cropped to
+        the frame of 62.5 l0.
     by : str
-        "surrogate", or "simulator": from the surrogate's fit on by simulations.
+        "surrogate", or "simulator" to continue from the surrogate's fit with simulations.
     surrogate : Surrogate, str, Path or None
-        Or the folder of one; None for the shipped surrogate.
+        A surrogate or its folder; None for the shipped one.
     start : CellParameters, optional
-        Where a fit by the simulator begins; no surrogate is asked then.
+        Start of a fit by the simulator without a surrogate.
     layers : int, optional
-        Cell layers of simulations; those of the surrogate, or 7 where there is none.
+        Cell layers of simulations; by default those of the surrogate, or 7 without one.
     accuracy : str
-        Of simulations, as `simulate` takes it.
+        Of simulations, as in `simulate`.
     simulations : int
-        That a fit may make.
+        Largest number of simulations.
     error : float, optional
         Standard error of a ratio (0.01), or of the outline (0.25 l0).
     seed : int
@@ -142,18 +142,18 @@ def fit(
     Raises
     ------
     RaptorError
-        Where an argument is none that is allowed, or what was measured cannot be measured on the mould.
+        If an argument is not allowed, or the measurement is not possible on the mould.
 
     Examples
     --------
     >>> found = fit("glial_1", area_ratio=0.81, width_ratio=0.80)
     """
     if by not in get_args(By):
-        raise RaptorError(f"a fit by '{by}' is asked for; allowed are {', '.join(get_args(By))}")
+        raise RaptorError(f"by is '{by}'; allowed are {', '.join(get_args(By))}")
     if start is not None:
         if by == "surrogate":
             raise RaptorError(
-                'parameters are where the simulator starts; ask it too: by="simulator", or --by simulator'
+                'start parameters need a fit by the simulator: by="simulator", or --by simulator'
             )
         start = require_parameters(start).require_sampled("fit")
     target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
@@ -163,8 +163,8 @@ def fit(
         surrogate = load_surrogate(surrogate)
     if surrogate is not None and layers not in (None, surrogate.layers):
         raise RaptorError(
-            f"layers is {layers}, but this surrogate is of {surrogate.layers}; leave it out, or start the "
-            "simulator from parameters of your own"
+            f"layers is {layers}, but this surrogate is for {surrogate.layers}; omit it, or start the "
+            "simulator from your own parameters"
         )
     model = NetworkModel(surrogate.layers if surrogate is not None else layers or 7)
     simulator = Simulator(model, accuracy, surrogate.pixels if surrogate else PIXELS, seed)
@@ -176,7 +176,7 @@ def _target(
     width_ratio: float | None,
     outline: Outline | shapely.Geometry | str | Path | None,
 ) -> Target | Outline:
-    """What was measured: ratios, or an outline."""
+    """The measurement: ratios or an outline."""
     ratios = {"area ratio": area_ratio, "width ratio": width_ratio}
     given = {name: value for name, value in ratios.items() if value is not None}
     if bool(given) + (outline is not None) != 1:
@@ -196,7 +196,7 @@ def _target(
 
 
 def _fit(request: Request) -> FittedTissue:
-    """The fit that is asked for."""
+    """The requested fit."""
     found, measure, densities = _search(request)
     density = densities([found.parameters])[0]
     area, width = map(float, shape_ratios(density, request.simulator.cast(request.mould), request.threshold))
@@ -225,7 +225,7 @@ def _fit(request: Request) -> FittedTissue:
 
 
 def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
-    """The minimum, by the surrogate, or from there or the start on by the simulator."""
+    """The minimum by the surrogate, or by the simulator from there or from the start."""
     if request.surrogate is not None:
         (start_by, residuals), (measure, _) = (
             request.measure(
@@ -247,7 +247,7 @@ def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
 
 
 def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Minimum, Measure, Densities]:
-    """The surrogate's fit corrected by simulations, and then a search by the simulator with those left."""
+    """The surrogate's fit corrected by simulations, then a search by the simulator with the rest."""
     measure, residuals = _by_simulation(request)
     budget = max(1, request.simulations // CORRECTED)
     best = correct(found, predicted, measure, residuals, budget=budget, enough=ENOUGH)
@@ -260,7 +260,7 @@ def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Mi
 
 
 def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
-    """What is measured of simulated tissues, and what the fit makes small of it."""
+    """The measured quantities of simulated tissues and their residuals."""
     return request.measure(request.simulated, request.simulator.measure(request.mould), request.threshold)
 
 
@@ -273,7 +273,7 @@ def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[s
 def _intervals(
     request: Request, outline: Outline, measure: Measure, found: Minimum
 ) -> dict[str, tuple[float, float]]:
-    """95 % intervals of a fit to an outline, by its slope; none where a combination is left open."""
+    """95 % intervals of a fit to an outline, from its derivatives; none if a combination is left open."""
     step = {"step": STEP} if request.by_simulator else {}
     errors = deviations(measure, found, outline, request.error or OUTLINE_ERROR, **step)
     if not np.isfinite(errors).all():

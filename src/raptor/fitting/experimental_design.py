@@ -1,9 +1,9 @@
-"""Which further measurement would narrow the posterior most: expected posterior variances.
+"""Experimental design: the further measurement that would narrow the posterior most.
 
-For each candidate, hypothetical tissues are drawn from the posterior, measured with an error, and the
-posterior is weighed again by each of these measurements; what is left of the parameters' variances, averaged
-over the tissues, ranks the candidates. Simulations at draws from the posterior tell how much the surrogate
-errs there in each candidate, which counts as error too, and how thick tissues are, which no field shows.
+For each candidate, hypothetical tissues are drawn from the posterior and measured with an error, and the
+posterior is reweighted with each of these measurements; the remaining variances of the parameters, averaged
+over the tissues, rank the candidates. Simulations at posterior draws measure the surrogate's error of each
+candidate, which is added to the measurement error, and the thickness of tissues, which no field shows.
 """
 
 from collections.abc import Callable
@@ -19,10 +19,10 @@ from raptor.fitting.simulator import Simulator
 from raptor.fitting.targets import PARAMETERS, Target, parameters_at
 from raptor.moulds.geometry import Mould
 
-DRAWS = 8  # simulations at draws from the posterior: the error of the surrogate there, and thickness
-DRAWN = 3000  # points that stand for the posterior
-TISSUES = 200  # hypothetical ones
-LEAST = 5  # simulations that a plane through thickness over the parameters needs
+DRAWS = 8  # simulations at posterior draws, for the surrogate's error there and for thickness
+DRAWN = 3000  # points that represent the posterior
+TISSUES = 200  # hypothetical tissues
+LEAST = 5  # simulations needed to fit a plane of thickness over the parameters
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Sampled:
     Parameters
     ----------
     units : ndarray (n, 3)
-        Where, in the unit cube.
+        Positions in the unit cube.
     table : DataFrame
-        Parameters, and each of `SEEN` as simulated, and as the surrogate has it under `{name}_predicted`;
-        `thickness`.
+        Parameters; each of `SEEN`, simulated and predicted (`{name}_predicted`); `thickness`.
+
     """
 
     units: NDArray[np.float64]
@@ -66,12 +66,12 @@ def simulate_draws(
 
 
 def rank_measurements(posterior: Posterior, sampled: Sampled, target: Target, seed: int) -> pd.DataFrame:
-    """Candidates for a further measurement, the one that leaves least first.
+    """Candidates for a further measurement, the most informative first.
 
     Columns `left_{parameter}` and `left` (root mean square over parameters) are standard deviations expected
-    after the measurement, over those before it; `measurement_error` and `model_error` are what is assumed;
-    `spread` is the candidate's own deviation over the posterior. `left_exact_model` is `left` with a model
-    that does not err.
+    after the measurement, over those before it; `measurement_error` and `model_error` are the assumed errors;
+    `spread` is the candidate's own deviation over the posterior. `left_exact_model` is `left` for a model
+    without error.
     """
     generator = np.random.default_rng(seed)
     drawn = generator.choice(len(posterior.weights), DRAWN, p=posterior.weights)
@@ -101,9 +101,9 @@ def expected_left(
     parameters : ndarray (n, p)
         Equally likely draws.
     values : ndarray (n, k)
-        What would be measured there.
+        The candidate's values there.
     errors : ndarray (k,)
-        Standard errors, of model and measurement together.
+        Standard errors of model and measurement combined.
     """
     truths = generator.choice(len(values), TISSUES, replace=len(values) < TISSUES)
     variances = np.zeros(parameters.shape[1])
@@ -142,7 +142,7 @@ def _row(
 def _values(
     posterior: Posterior, sampled: Sampled, drawn: NDArray[np.intp]
 ) -> dict[str, NDArray[np.float64]]:
-    """What is seen at draws, by name, (draws,); thickness by a plane through what simulations show."""
+    """Measured quantities at draws, by name, (draws,); thickness from the plane through the simulations."""
     values = {name: posterior.values[drawn, column] for column, name in enumerate(posterior.names)}
     thickness = sampled.table["thickness"].to_numpy(dtype=float)
     if len(thickness) >= LEAST and np.isfinite(thickness).all():
@@ -151,7 +151,7 @@ def _values(
 
 
 def _model_errors(sampled: Sampled) -> dict[str, float]:
-    """Root mean square errors of the surrogate at simulated draws, and of the plane through thickness."""
+    """Root mean square errors of the surrogate at simulated draws, and of the plane of thickness."""
     if sampled.table.empty:
         return {}
     table = sampled.table

@@ -23,12 +23,12 @@ def fit_joint(
     budget: int,
     starts: int = STARTS,
 ) -> dict[str, Any]:
-    """Fit tissues together by their surrogate's measures, and from there by those that simulate, as JSON.
+    """Fit tissues with common parameters by the surrogate, and continue by the simulator; returns JSON.
 
     Parameters
     ----------
     predicted, refined, simulated : sequence of Measure
-        Of each tissue, in the order of the targets: by the surrogate to start from, to refine by, simulated.
+        Of each tissue, in the order of the targets: by the surrogate, coarse and fine, and by simulation.
     budget : int
         Points at which all tissues may be simulated; 0: no fit by the simulator.
     """
@@ -47,7 +47,7 @@ def fit_joint(
 
 
 def joint_measure(measures: Sequence[Measure]) -> Measure:
-    """Area and width ratios of several tissues with common parameters, side by side, (n, 2 tissues)."""
+    """Area and width ratios of several tissues with common parameters, (n, 2 tissues)."""
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         return np.concatenate([each(parameters) for each in measures], axis=1)
@@ -56,7 +56,7 @@ def joint_measure(measures: Sequence[Measure]) -> Measure:
 
 
 def joint_residuals(targets: Sequence[Target]) -> Residuals:
-    """What a fit of several tissues makes small, of measures as `joint_measure` gives them."""
+    """Residuals of several tissues, of the values of `joint_measure`."""
 
     def residuals(measured: NDArray[np.float64]) -> NDArray[np.float64]:
         parts = np.split(measured, len(targets), axis=-1)
@@ -67,7 +67,7 @@ def joint_residuals(targets: Sequence[Target]) -> Residuals:
 
 
 def _content(found: Minimum, targets: Mapping[str, Target]) -> dict[str, Any]:
-    """A joint fit as JSON holds it: common parameters, and each tissue's ratios and rss."""
+    """A joint fit as JSON: common parameters, and each tissue's ratios and rss."""
     parts = found.measured.reshape(len(targets), 2)
     tissues = {
         name: dict(zip(RATIOS, map(float, part), strict=True)) | {"rss": target.rss(part)}

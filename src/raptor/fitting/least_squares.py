@@ -1,7 +1,7 @@
 """Bounded non-linear least squares over the paper's region, by a surrogate or by the simulator.
 
 The residual sum of squares of area ratio and central width ratio is minimised (paper, "Parameter fitting").
-Three parameters and two numbers: the minimum is a valley, and the rank of the problem says so.
+With three parameters and two numbers the minimum is a valley, which the rank of the problem shows.
 """
 
 from collections.abc import Callable
@@ -17,30 +17,30 @@ from raptor.fitting.targets import Measure, Target, parameters_at
 from raptor.parameters import CellParameters
 
 STEP = 0.02  # of a finite difference, over a bound's width
-STARTS = 128  # points of the Sobol sequence among which a search chooses where to start
-REFINED = 4  # of the points that a search starts from
+STARTS = 128  # points of the Sobol sequence from which starting points are chosen
+REFINED = 4  # starting points that are refined
 MOST_STEPS = 30
-WITHIN = (1e-6, 1 - 1e-6)  # SciPy asks for a start within the bounds
+WITHIN = (1e-6, 1 - 1e-6)  # SciPy needs a start strictly within the bounds
 TOLERANCE = 1e-3  # of singular values: change of a ratio across the whole range of a parameter
 
 Residuals = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""From what is measured, (..., k), to what least squares makes small, (..., m)."""
+"""From measured quantities (..., k) to residuals (..., m)."""
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """The least residual sum of squares that was found.
+    """The minimum of the residual sum of squares.
 
     Parameters
     ----------
     unit : ndarray (3,)
-        Where, in the unit cube of `targets.parameters_at`.
+        Position in the unit cube of `targets.parameters_at`.
     measured : ndarray (k,)
-        What is measured there.
+        The measured quantities there.
     rss : float
         Residual sum of squares.
     rank : int
-        How many combinations of the three parameters the residuals determine there.
+        Number of combinations of the three parameters that the residuals determine there.
     evaluations : int
         Points at which the model was evaluated.
     """
@@ -64,7 +64,7 @@ class Fit:
     Parameters
     ----------
     parameters : CellParameters
-        At the least cost found.
+        At the minimum.
     area_ratio, width_ratio : float
         Of the model there.
     rss : float
@@ -90,11 +90,11 @@ class Fit:
 
 
 class _Enough(Exception):  # noqa: N818 - no error: a search that ends
-    """The budget is spent, or the residuals are below what noise allows to tell apart."""
+    """The budget is spent, or the residuals are below the noise."""
 
 
 class _Memory:
-    """What was measured at points of the cube, each once, until a budget is spent or a fit is good enough."""
+    """Evaluated points of the cube, each once, until a budget is spent or a fit is good enough."""
 
     def __init__(self, measure: Measure, residuals: Residuals, budget: int, enough: float) -> None:
         self.measure, self.residuals, self.budget, self.enough = measure, residuals, budget, enough
@@ -129,7 +129,7 @@ class _Memory:
         return self.jacobians[unit.tobytes()]
 
     def best(self) -> Minimum:
-        """The best of all points seen."""
+        """The best of all evaluated points."""
         costs = {key: _cost(self.residuals(measured)) for key, measured in self.measured.items()}
         key = min(costs, key=costs.__getitem__)
         last = next(reversed(self.jacobians.values()), np.zeros((1, 3)))
@@ -140,12 +140,12 @@ class _Memory:
 def minimise(
     measure: Measure, residuals: Residuals, *, seed: int, starts: int = STARTS, fine: Measure | None = None
 ) -> Minimum:
-    """Search the whole region, by a model that is cheap: from the best of many points that fill it.
+    """Search the whole region with a cheap model, from the best of many points that fill it.
 
     Parameters
     ----------
     fine : Measure, optional
-        A better model, which goes on from where `measure` ended.
+        A better model, which continues from where `measure` ended.
     starts : int
         Points of a Sobol sequence at which the model is evaluated first (a power of two); the best four are
         refined.
@@ -153,14 +153,14 @@ def minimise(
     Raises
     ------
     RaptorError
-        Where the mould allows none of the measurements.
+        If none of the measurements is possible on the mould.
     """
     memory = _Memory(measure, residuals, 10**9, 0.0)
     points = qmc.Sobol(3, seed=seed).random(starts)
     costs = np.array([_cost(each) for each in memory.residuals_at(points)])
     if not np.isfinite(costs).any():
         raise RaptorError(
-            "nothing of what was measured can be measured on this mould: a tether may fill its central "
+            "none of the measured ratios can be computed on this mould: a tether may fill its central "
             "section; give the area ratio alone, or another mould"
         )
     for start in np.argsort(costs)[:REFINED]:
@@ -183,28 +183,28 @@ def descend(
     enough: float,
     tolerance: float,
 ) -> Minimum:
-    """Go down from a point (3,) of the unit cube, by a model that may be expensive and noisy.
+    """Descend from a point (3,) of the unit cube, with a model that may be expensive and noisy.
 
     Parameters
     ----------
     budget : int
-        Evaluations at most, four for each step down.
+        Largest number of evaluations; each step takes four.
     step : float
         Of finite differences, over a bound's width.
     enough : float
         Residual sum of squares below which the search ends.
     tolerance : float
-        Relative length of steps, and relative gain, below which it ends.
+        Relative step and relative gain below which it ends.
 
     Raises
     ------
     RaptorError
-        Where the model measures nothing at the start.
+        If the model gives no ratio at the start.
     """
     memory = _Memory(measure, residuals, max(budget, 1), enough)
     start = np.clip(start, *WITHIN)
     if not np.isfinite(_cost(memory.residuals_at(start[None])[0])):
-        raise RaptorError("nothing of what was measured can be measured where the search starts")
+        raise RaptorError("none of the measured ratios can be computed at the start of the search")
     _descend(memory, start, step, tolerance)
     return memory.best()
 
@@ -217,7 +217,7 @@ def fit(
 
 
 def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> None:
-    """SciPy's trust region reflective method within the cube; what it sees stays in memory."""
+    """SciPy's trust region reflective method within the cube; evaluations stay in memory."""
 
     def residuals(unit: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(memory.residuals_at(unit[None])[0])
@@ -241,6 +241,6 @@ def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:
-    """Residual sum of squares; infinite where there is nothing to measure."""
+    """Residual sum of squares; infinite if a ratio is missing."""
     total = float((residuals**2).sum())
     return total if np.isfinite(total) else np.inf

@@ -1,8 +1,8 @@
-"""What can be measured on a tissue beside its area and central width, and how well.
+"""Further measurements on a tissue, beyond its area and central width, with their standard errors.
 
-Errors are standard errors of one measurement: of ratios as of A/A0, of the mean orientation as polarised
-light or a stained section gives it, of tension a tenth of its value (its unit, kappa0 l0, must be known too),
-of thickness as focusing through the gel gives it. They are assumptions, to be replaced by a laboratory's own.
+The errors are assumptions, to be replaced by a laboratory's own: of ratios as for A/A0, of mean orientation
+as from polarised light or a stained section, of tension a tenth of its value (its unit, kappa0 l0, must be
+known too), of thickness as from focusing through the gel.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from raptor.symmetry import FIELDS
 STATIONS = (0.25, 0.5, 0.75)  # of half the long side, from the centre
 WIDTHS = tuple(f"width_{round(100 * place)}" for place in STATIONS)
 SEEN = (*RATIOS, *WIDTHS, "alignment", "upright", "tension")
-"""What fields show, in the order of `seen`."""
+"""Quantities that fields show, in the order of `seen`."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Candidate:
     Parameters
     ----------
     name, label : str
-        For files and for figures.
+        For files and figures.
     parts : tuple of str
-        What is measured, of `SEEN` or "thickness".
+        Measured quantities, of `SEEN` or "thickness".
     error : float
-        Standard error of each part; where `relative`, over its value.
+        Standard error of each part, over its value if `relative`.
     """
 
     name: str
@@ -53,11 +53,11 @@ CANDIDATES = (
     Candidate("tension", "mean tension", ("tension",), 0.1, relative=True),
     Candidate("thickness", "thickness", ("thickness",), 0.02),
 )
-"""Every further measurement that is weighed."""
+"""All candidates."""
 
 
 def seen(fields: NDArray[np.floating], cast: CastMould, threshold: float) -> NDArray[np.float64]:
-    """What the eight fields (8, y, x) of a tissue show of `SEEN`, (8,).
+    """The quantities `SEEN` of a tissue's fields (8, y, x), (8,).
 
     Widths are w/w0 on pairs of sections at `STATIONS` to both sides of the centre. alignment is
     `directors.alignment`, upright the mean over cells of (s.z)^2, tension the mean over cells, kappa0 l0.
@@ -70,9 +70,9 @@ def seen(fields: NDArray[np.floating], cast: CastMould, threshold: float) -> NDA
 
 
 def thickness_ratio(simulation: Tissue) -> float:
-    """Thickness of a simulated tissue over that of the gel as cast: standard deviations of cells' heights.
+    """Thickness of a simulated tissue over that of the gel as cast, as standard deviations of cell heights.
 
-    NaN of a single layer.
+    NaN for a single layer.
     """
     cast = float(simulation.sites[:, 2].std())
     return float(simulation.positions[:, 2].std()) / cast if cast > 0 else float("nan")

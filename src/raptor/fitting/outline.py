@@ -1,8 +1,8 @@
-"""Fits to the whole outline of a tissue, from an image: what two ratios leave open, its shape may decide.
+"""Fits to the whole outline of a tissue, which may determine what two ratios leave open.
 
-The outline is where density crosses the threshold of tissue. Residuals are signed distances from points
-spread evenly along the measured outline to the predicted one, positive where the prediction is too large;
-both are found to a part of a pixel (marching squares).
+The outline is the contour of the density at the threshold of tissue. Residuals are signed distances from
+evenly spaced points of the measured outline to the predicted one, positive if the prediction is too large;
+both have sub-pixel precision (marching squares).
 """
 
 from collections.abc import Callable, Sequence
@@ -25,8 +25,8 @@ from raptor.moulds.bitmap import MOST_PIXELS
 from raptor.parameters import CellParameters
 
 POINTS = 128  # along the measured outline
-SPECK = 0.01  # of the tissue's area, below which a piece of an image is dirt
-APART = 4.0  # l0; how far apart points of an outline are before their errors differ
+SPECK = 0.01  # of the tissue's area; smaller pieces of an image are ignored
+APART = 4.0  # l0; correlation length of errors along an outline
 STEP = 0.02  # of finite differences
 
 Densities = Callable[[Sequence[CellParameters]], Any]
@@ -40,7 +40,7 @@ class Outline:
     Parameters
     ----------
     points : ndarray (n, 2)
-        Evenly along it, x and y, l0.
+        Evenly spaced, x and y, l0.
     length : float
         Of the outline, l0.
     """
@@ -50,7 +50,7 @@ class Outline:
 
     @classmethod
     def along(cls, tissue: shapely.Geometry, count: int = POINTS) -> "Outline":
-        """Points spread evenly along the outer boundaries of a tissue."""
+        """Points evenly spaced along the outer boundaries of a tissue."""
         rings = [shapely.Polygon(part.exterior).exterior for part in shapely.get_parts(tissue)]
         length = sum(ring.length for ring in rings)
         places = [np.arange(0, ring.length, length / count) for ring in rings]
@@ -63,18 +63,18 @@ class Outline:
 def read_outline(path: Path, page: int | None = None) -> Outline:
     """Read the outline of a tissue from a picture (PNG, JPEG, TIFF) whose frame is the image of 62.5 l0.
 
-    The tissue is what differs from the rim of the picture; its edge is half-way between both colours (Otsu).
-    Bring the picture into the frame of the mould first: square, the mould's centre in its middle.
+    The tissue is what differs from the border of the picture; its edge is half-way between both colours
+    (Otsu). Crop the picture to the frame first: square, with the mould's centre in the middle.
 
     Raises
     ------
     RaptorError
-        Where the picture cannot be read, is not square, or shows no tissue.
+        If the picture cannot be read, is not square, or shows no tissue.
     """
     grey = _grey(Path(path), page)
     rim = np.concatenate([grey[0], grey[-1], grey[:, 0], grey[:, -1]])
     if grey.min() == grey.max():
-        raise RaptorError(f"outline {path} is of one colour; paint the tissue dark on white")
+        raise RaptorError(f"outline {path} has one colour; paint the tissue dark on white")
     dark = grey <= threshold_otsu(grey)
     level = float(np.median(grey[dark]) + np.median(grey[~dark])) / 2  # half-way, where edges are soft
     excess = level - grey if np.median(rim) > level else grey - level
@@ -87,7 +87,7 @@ def outline_of(density: NDArray[np.floating], threshold: float) -> Outline:
     Raises
     ------
     RaptorError
-        Where the density is nowhere above the threshold.
+        If the density is nowhere above the threshold.
     """
     return Outline.along(_pieces(density - threshold, "the density"))
 
@@ -95,7 +95,7 @@ def outline_of(density: NDArray[np.floating], threshold: float) -> Outline:
 def distances(outline: Outline, density: NDArray[np.floating], threshold: float) -> NDArray[np.float64]:
     """Signed distances (n,) of an outline's points to the edge of a density (y, x), positive inside it, l0.
 
-    NaN where the density is nowhere above the threshold.
+    NaN if the density is nowhere above the threshold.
     """
     try:
         tissue = _pieces(density - threshold, "the density")
@@ -110,7 +110,7 @@ def distances(outline: Outline, density: NDArray[np.floating], threshold: float)
 
 
 def outline_measure(densities: Densities, outline: Outline, threshold: float) -> Measure:
-    """Signed distances (n, points) of an outline to what a model predicts, over the root of their number.
+    """Signed distances (n, points) of an outline to a model's, over the root of their number.
 
     The residual sum of squares is then the mean square distance, l0^2.
     """
@@ -125,10 +125,10 @@ def outline_measure(densities: Densities, outline: Outline, threshold: float) ->
 def deviations(
     measure: Measure, minimum: Minimum, outline: Outline, error: float, step: float = STEP
 ) -> NDArray[np.float64]:
-    """Standard errors (3,) of the parameters of a fit to an outline, from its slope at the minimum.
+    """Standard errors (3,) of the parameters of a fit to an outline, from the derivatives at the minimum.
 
-    Each stretch of `APART` of the outline counts as one measurement, with the larger of `error` (l0) and the
-    residual root mean square distance. Infinite where the outline leaves a combination open.
+    Each length `APART` of the outline counts as one measurement, with the larger of `error` (l0) and the root
+    mean square residual distance. Infinite if the outline leaves a combination open.
     """
     steps = np.where(minimum.unit + step <= 1, step, -step)
     moved = [parameters_at(unit) for unit in (minimum.unit, *(minimum.unit + np.diag(steps)))]
@@ -150,14 +150,14 @@ def _grey(path: Path, page: int | None) -> NDArray[np.float64]:
     rows, columns = colours.shape[:2]
     if rows != columns or columns > MOST_PIXELS:
         raise RaptorError(
-            f"outline {path} is {columns} x {rows} pixels large; crop it to the square frame of {IMAGE_SIZE} "
+            f"outline {path} is {columns} x {rows} pixels; crop it to the square frame of {IMAGE_SIZE} "
             f"l0 about the mould's centre, at most {MOST_PIXELS} pixels per side"
         )
     return np.asarray(colours.mean(axis=2))
 
 
 def _pieces(excess: NDArray[np.floating], what: str) -> shapely.Geometry:
-    """Where a field (y, x) on the image's raster is positive, without specks, l0."""
+    """The region where a field (y, x) on the image's raster is positive, without specks, l0."""
     size = pixel_size(excess.shape[-1])
     padded = np.pad(excess, 1, constant_values=min(float(excess.min()), -1e-6))
     origin = -IMAGE_SIZE / 2 - size / 2

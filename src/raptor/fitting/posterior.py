@@ -1,8 +1,8 @@
-"""What measurements say of the parameters: a posterior over the whole region, and profile likelihoods.
+"""Posterior of the parameters over the whole region, and profile likelihoods.
 
-The surrogate is evaluated at Sobol points that fill the region; between them what it says is interpolated
-(cubic radial functions), so that tens of thousands of further Sobol points cost nothing. Each is weighed by
-its likelihood: in three dimensions this is plain quadrature, with no chain that could miss an end of the
+The surrogate is evaluated at Sobol points that fill the region and interpolated between them (cubic radial
+basis functions), so that tens of thousands of further Sobol points are cheap. Each is weighted by its
+likelihood: in three dimensions this is plain quadrature, without a chain that could miss an end of the
 valley.
 
 The likelihood of a measured ratio m at predicted ratio p is normal with
@@ -10,7 +10,7 @@ The likelihood of a measured ratio m at predicted ratio p is normal with
     sigma^2 = error^2 + (h / 1.96)^2 + i^2,
 
 where `error` is that of the measurement, h the half width of the surrogate's calibrated 95 % band there, and
-i what interpolation errs by. The prior is the paper's distribution: delta uniform, both kappas uniform over
+i the interpolation error. The prior is the paper's distribution: delta uniform, both kappas uniform over
 their bounded plane.
 """
 
@@ -34,27 +34,27 @@ from raptor.surrogate.bands import LEVELS
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-POINTS = 128  # of the Sobol sequence, at which the surrogate surveys the parameters
+POINTS = 128  # Sobol points at which the surrogate is evaluated
 RATIO_ERROR = 0.01  # standard error of a measured area or width ratio
 DENSE = 2**16  # points of the posterior
-BANDED = 32  # points of a survey at which bands are found
-TOGETHER = 32  # predictions at a time
+BANDED = 32  # points of a survey at which bands are computed
+TOGETHER = 32  # predictions per batch
 QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 BINS = 40  # of a profile
-UNLIKELY = 0.01  # chance of so large a chi2, below which the model cannot make what was measured
+UNLIKELY = 0.01  # probability of a larger chi2 below which the measurement is out of reach
 BOUNDS = dict(zip(PARAMETERS, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True))
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What a model says over the whole region.
+    """A model's values over the whole region.
 
     Parameters
     ----------
     units : ndarray (n, 3)
         Points of the unit cube (`targets.parameters_at`).
     values : ndarray (n, k)
-        What is seen there, in the order `names`; area and width ratio first.
+        Measured quantities there, in the order `names`; area and width ratio first.
     sigma : ndarray (b, 2)
         Standard error of the model's area and width ratio at the first b points.
     """
@@ -67,21 +67,21 @@ class Survey:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Points of the region, weighed by what was measured.
+    """Points of the region, weighted by the measurement.
 
     Parameters
     ----------
     units, parameters : ndarray (n, 3)
         Points in the unit cube and as parameters.
     values : ndarray (n, k)
-        What the model shows there, in the order `names`.
+        The model's values there, in the order `names`.
     prior, weights : ndarray (n,)
         Weights before and after the measurement; each sums to 1.
     log_likelihood : ndarray (n,)
     chi2 : ndarray (n,)
         Sum of squared residuals over their variances.
     measurements : int
-        How many were made.
+        Number of measurements.
     """
 
     units: NDArray[np.float64]
@@ -96,11 +96,11 @@ class Posterior:
 
     @cached_property
     def effective(self) -> float:
-        """Number of equally weighed points that would say as much."""
+        """Effective number of equally weighted points."""
         return float(1 / (self.weights**2).sum())
 
     def draws(self, count: int, seed: int) -> NDArray[np.intp]:
-        """Numbers of points (count,) drawn by their weights, evenly along the posterior's longest axis."""
+        """Indices (count,) of points drawn by weight, evenly along the posterior's longest axis."""
         along = self.units @ _longest(self)
         order = np.argsort(along, kind="stable")
         places = (np.arange(count) + np.random.default_rng(seed).random()) / count
@@ -109,15 +109,15 @@ class Posterior:
 
 
 def survey(surrogate: "Surrogate", mould: Mould, seed: int, points: int = POINTS) -> Survey:
-    """Ask the surrogate about a mould's tissue at points (a power of two) that fill the region.
+    """Evaluate the surrogate for a mould at points (a power of two) that fill the region.
 
-    Predictions are means over the images of D4, as those that bands were calibrated on; bands are found at
-    the first 32 points.
+    Predictions are means over the images of D4, like those on which bands were calibrated; bands are computed
+    at the first 32 points.
 
     Raises
     ------
     RaptorError
-        Where the surrogate is not calibrated, or the mould holds no cell.
+        If the surrogate is not calibrated, or the mould holds no cell.
     """
     units = qmc.Sobol(3, seed=seed).random(points)
     parameters = [parameters_at(unit) for unit in units]
@@ -137,16 +137,16 @@ def survey(surrogate: "Surrogate", mould: Mould, seed: int, points: int = POINTS
 def infer(
     found: Survey, target: Target, seed: int, error: float = RATIO_ERROR, dense: int = DENSE
 ) -> Posterior:
-    """Weigh the region by what was measured with a standard error.
+    """Weight the region by a measurement with a standard error.
 
     Raises
     ------
     RaptorError
-        Where the mould allows none of the measurements.
+        If a measurement is not possible on the mould.
     """
     if not np.isfinite(found.values[:, target.columns]).all():
         raise RaptorError(
-            "what was measured cannot be measured everywhere on this mould: a tether may fill its central "
+            "the measured ratios cannot be computed everywhere on this mould: a tether may fill its central "
             "section; give the area ratio alone, or another mould"
         )
     units = qmc.Sobol(3, seed=seed + 1).random(dense)
@@ -196,13 +196,13 @@ def interpolation_error(found: Survey) -> NDArray[np.float64]:
 
 
 def summarise(posterior: Posterior) -> dict[str, Any]:
-    """Intervals, profiles and identifiability, as JSON holds them.
+    """Intervals, profiles and identifiability, as JSON.
 
-    Of each parameter: mean and standard deviation, prior and posterior; quantiles; the 95 % interval of the
-    profile likelihood, and whether it reaches the region's bounds, where the data set none. `directions` are
-    the combinations of parameters, over their prior deviations, from the best to the least determined, with
-    the share of the prior's deviation that is `left`. `reachable` is false where even the best point is
-    further from the measurement than errors explain: then no interval means anything.
+    For each parameter: mean and standard deviation, prior and posterior; quantiles; the 95 % interval of the
+    profile likelihood, and whether it ends at a bound of the region instead of one set by the data.
+    `directions` are combinations of parameters, over their prior deviations, from the best to the least
+    determined, with the share of the prior's deviation that is `left`. `reachable` is false if even the best
+    point is further from the measurement than errors explain; the intervals are then meaningless.
     """
     profiles = {name: profile(posterior, name) for name in PARAMETERS}
     left, directions = identified(posterior)
@@ -237,9 +237,9 @@ def summarise(posterior: Posterior) -> dict[str, Any]:
 
 
 def profile(posterior: Posterior, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A parameter's values (bins,), and at each the greatest log likelihood (bins,) over the others.
+    """A parameter's values (bins,), and at each the maximum log likelihood (bins,) over the others.
 
-    Relative to the greatest of all; -inf where no point lies.
+    Relative to the global maximum; -inf in bins without points.
     """
     bounds, column = BOUNDS[name], PARAMETERS.index(name)
     edges = np.linspace(bounds.lower, bounds.upper, BINS + 1)
@@ -250,7 +250,7 @@ def profile(posterior: Posterior, name: str) -> tuple[NDArray[np.float64], NDArr
 
 
 def identified(posterior: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Share (3,) of the prior's deviation left along combinations of parameters (3, 3), least first.
+    """Share (3,) of the prior's deviation left along combinations of parameters (3, 3), smallest first.
 
     The combinations are those of the generalised eigenvalue problem of both covariances, of length 1 in
     parameters over their prior deviations.
@@ -265,7 +265,7 @@ def identified(posterior: Posterior) -> tuple[NDArray[np.float64], NDArray[np.fl
 def moments(
     values: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weighed mean and standard deviation (k,) of values (n, k)."""
+    """Weighted mean and standard deviation (k,) of values (n, k)."""
     mean = weights @ values
     return mean, np.sqrt(weights @ (values - mean) ** 2)
 
@@ -283,14 +283,14 @@ def _likely(posterior: Posterior) -> NDArray[np.bool_]:
 
 
 def _quantiles(values: NDArray[np.float64], weights: NDArray[np.float64]) -> dict[str, float]:
-    """Weighed quantiles of values (n,), by their level."""
+    """Weighted quantiles of values (n,), by level."""
     order = np.argsort(values)
     found = np.interp(QUANTILES, np.cumsum(weights[order]), values[order])
     return {str(level): float(value) for level, value in zip(QUANTILES, found, strict=True)}
 
 
 def _interval(centres: NDArray[np.float64], heights: NDArray[np.float64], name: str) -> dict[str, Any]:
-    """Where a profile is within 95 % of a single parameter's likelihood ratio, to the width of a bin."""
+    """The interval where a profile lies within the 95 % likelihood ratio of one parameter."""
     inside = np.flatnonzero(heights > -chi2.ppf(0.95, 1) / 2)
     half = (centres[1] - centres[0]) / 2
     first, last = int(inside[0]), int(inside[-1])

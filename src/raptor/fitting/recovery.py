@@ -1,4 +1,4 @@
-"""What fits find of a tissue of known parameters, a simulated one: by its ratios and by its outline."""
+"""Recovery of known parameters from a simulated tissue, by its ratios and by its outline."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -18,8 +18,8 @@ from raptor.raster import density_threshold
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-ERROR = 0.25  # l0; of an outline drawn on a photograph, a pixel of the paper's image
-SEARCHES = 3  # from points of their own: where a valley is flat, they end in different places
+ERROR = 0.25  # l0; of an outline drawn on a photograph: a pixel of the paper's image
+SEARCHES = 3  # from different starting points: in a flat valley they end in different places
 
 
 def recover(
@@ -64,7 +64,7 @@ def recover(
 
 
 def _outcome(found: Sequence[CellParameters], truth: CellParameters) -> dict[str, Any]:
-    """Fits and how far they are from the truth."""
+    """Fits and their distance from the true parameters."""
     widths = np.array([bounds.upper - bounds.lower for bounds in (DELTA, KAPPA_NNN, KAPPA_NNNN)])
     errors = (as_array(found) - as_array([truth])) / widths
     return {"fits": [asdict(each) for each in found], "error": float(np.sqrt((errors**2).mean()))}

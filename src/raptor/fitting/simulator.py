@@ -1,8 +1,8 @@
-"""Fits by the simulator itself, and simulation again at fitted parameters.
+"""Fits by the simulator itself, and verification at fitted parameters.
 
-A simulation's area ratio varies with its seed by about 0.003. Within a fit one seed serves all points
-(common random numbers), so that differences between points are those of the parameters; simulations again
-at the fitted point have seeds of their own.
+The area ratio of a simulation varies with its seed by about 0.003. Within a fit all points share one seed
+(common random numbers), so that differences between points are due to the parameters; verification uses
+new seeds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 
 STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
-RESTART = 5  # evaluations left, with which another start can make a step
-REPEATS = 4  # simulations again at a fit, with further seeds
-ENOUGH = 1e-5  # residual sum of squares that noise of 0.003 from seed to seed leaves anyway
+RESTART = 5  # evaluations needed to make a step from another start
+REPEATS = 4  # simulations with new seeds to verify a fit
+ENOUGH = 1e-5  # residual sum of squares due to a seed-to-seed noise of 0.003
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Simulator:
     ----------
     model : NetworkModel
     accuracy : str
-        As `condor.simulate` takes it.
+        As in `condor.simulate`.
     pixels : int
-        Side of the image that shapes are measured in.
+        Side of the image in which shapes are measured.
     seed : int
-        Of every simulation, but for those that ask for a further one.
+        Of every simulation, except for verification.
     """
 
     model: NetworkModel
@@ -54,11 +54,11 @@ class Simulator:
         return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
 
     def seed_of(self, further: int) -> int:
-        """The so many-th further seed; 0: that of fits."""
+        """The seed of fits (0) or the nth further one."""
         return (self.seed + further) % 2**31
 
     def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Tissue:
-        """Simulate a tissue, with the seed of fits or the so many-th further one."""
+        """Simulate a tissue, with the seed of fits (0) or the nth further one."""
         return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(further))
 
     def fields(self, simulation: Tissue) -> NDArray[np.float64]:
@@ -66,7 +66,7 @@ class Simulator:
         return rasterise(simulation.positions, simulation.orientation, simulation.tension, self.pixels)
 
     def cast(self, mould: Mould | CastMould) -> CastMould:
-        """A mould as simulated and seen; one that is cast stays as it is."""
+        """A mould as cast for simulations; one already cast is returned as is."""
         return CastMould(mould, self.model.layers, self.pixels) if isinstance(mould, Mould) else mould
 
     def ratios(self, simulation: Tissue, mould: Mould | CastMould) -> NDArray[np.float64]:
@@ -74,7 +74,7 @@ class Simulator:
         return shape_ratios(self.fields(simulation)[0], self.cast(mould))
 
     def measure(self, mould: Mould) -> Measure:
-        """Area and width ratio of a mould's tissue, simulated with one seed throughout."""
+        """Area and width ratio of a mould's tissue, simulated with one common seed."""
         cast = self.cast(mould)
 
         def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
@@ -86,10 +86,10 @@ class Simulator:
 def descend_by_simulation(
     measure: Measure, residuals: Residuals, start: NDArray[np.float64], budget: int
 ) -> Minimum:
-    """Fit by a measure that simulates, from a point (3,) of the unit cube, within a budget of points.
+    """Fit by simulations, from a point (3,) of the unit cube, within a budget of points.
 
-    Where the search ends before its budget does, it starts again from the valley's other side: at the best
-    point's delta, with spring constants mirrored in their ranges.
+    If the search ends before its budget, it restarts from the other side of the valley: at the best point's
+    delta, with spring constants mirrored in their ranges.
     """
     rules: dict[str, float] = {"step": STEP, "enough": ENOUGH, "tolerance": STEP / 10}
     first = descend(measure, residuals, start, budget=budget, **rules)
@@ -126,5 +126,5 @@ def measure_again(
 
 
 def _deviation(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation over the first axis; 0 of a single value."""
+    """Standard deviation over the first axis; 0 for a single value."""
     return values.std(axis=0, ddof=1) if len(values) > 1 else np.zeros(values.shape[1])

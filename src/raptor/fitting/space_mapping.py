@@ -1,9 +1,9 @@
-"""A surrogate's fit, corrected by a few simulations.
+"""Correction of a surrogate's fit by a few simulations (output space mapping).
 
-Where the surrogate errs, it errs alike at neighbouring parameters: the difference between the simulator and
-the surrogate at one point is added to the surrogate, which is fitted again (output space mapping, Bandler et
-al. 2004, DOI 10.1109/TMTT.2003.820904). Each round costs one simulation, where a step of least squares by
-the simulator itself costs four.
+The surrogate's error varies slowly with the parameters: the difference between the simulator and the
+surrogate at one point is added to the surrogate, which is fitted again (Bandler et al. 2004, DOI
+10.1109/TMTT.2003.820904). Each round costs one simulation; a least-squares step by the simulator itself
+costs four.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from raptor.fitting.least_squares import STEP, Minimum, Residuals, descend
 from raptor.fitting.targets import Measure
 from raptor.parameters import CellParameters
 
-NEAR = STEP / 10  # parts of a range by which a point must move to be simulated anew
-TOLERANCE = 1e-4  # of a search by the surrogate: no finer than its steps
+NEAR = STEP / 10  # of a range; smaller moves are not simulated again
+TOLERANCE = 1e-4  # of a search by the surrogate, no finer than its steps
 
 
 def correct(
@@ -29,7 +29,7 @@ def correct(
     budget: int,
     enough: float,
 ) -> Minimum:
-    """Go on from a surrogate's fit by simulating there and fitting the surrogate, so corrected, again.
+    """Continue from a surrogate's fit: simulate there, correct the surrogate, fit again.
 
     Parameters
     ----------
@@ -38,15 +38,15 @@ def correct(
     predicted, simulated : Measure
         The same quantities by the surrogate and by the simulator.
     budget : int
-        Simulations at most, one or more.
+        Largest number of simulations, at least one.
     enough : float
         Residual sum of squares below which it ends.
 
     Returns
     -------
     Minimum
-        The best point simulated, as measured there; `evaluations` counts simulations, `rank` is that of the
-        surrogate's slope.
+        The best simulated point; `evaluations` counts simulations, `rank` is that of the surrogate's
+        derivatives.
     """
     seen: list[Minimum] = []
     there = found
@@ -66,7 +66,7 @@ def correct(
 
 
 def _shifted(measure: Measure, shift: NDArray[np.float64]) -> Measure:
-    """A measure with a constant added; what could not be compared stays as it is."""
+    """A measure with a constant added; NaN in the shift count as zero."""
 
     def shifted(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         return measure(parameters) + np.nan_to_num(shift)

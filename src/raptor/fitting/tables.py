@@ -21,13 +21,13 @@ def write_fit(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def tabulate(fits: Sequence[dict[str, Any]], simulators: Sequence[dict[str, Any]] = ()) -> pd.DataFrame:
-    """A row a tissue: target; each kind of fit, the simulation there, and its seconds; the paper's."""
+    """One row per tissue: target; each kind of fit, its verification and seconds; the paper's fit."""
     by_simulator = {content["tissue"]: content for content in simulators}
     return pd.DataFrame([_row(content, by_simulator.get(content["tissue"])) for content in fits])
 
 
 def tabulate_joint(joint: Mapping[str, Any], fits: Sequence[dict[str, Any]]) -> pd.DataFrame:
-    """Parameters fitted in common beside the separate fits' mean and spread, ours and the paper's."""
+    """Common parameters beside mean and spread of the separate fits, ours and the paper's."""
     separate = [fit for fit in fits if fit["tissue"] in joint["targets"]]
     rows = [
         {"fit": "joint", **joint["surrogate"]["parameters"], "rss": joint["surrogate"]["rss"]},
@@ -57,7 +57,7 @@ def _row(content: Mapping[str, Any], simulator: Mapping[str, Any] | None) -> dic
 def _columns(
     name: str, fit: Mapping[str, Any], again: Mapping[str, Any], content: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """A fit's columns, and those of simulations again at its parameters; how long it took."""
+    """Columns of a fit and its verification, and the time it took."""
     row = {f"{name}_{key}": value for key, value in fit["parameters"].items()}
     row |= {f"{name}_{key}": fit[key] for key in (*RATIOS, "rss")}
     row |= {f"{name}_again_{key}": again[key] for key in AGAIN}
@@ -78,7 +78,7 @@ def _mean_and_spread(name: str, fits: Sequence[Mapping[str, float]]) -> list[dic
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
+    """A value in the types of JSON."""
     if isinstance(value, Mapping):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,7 +1,7 @@
-"""What a fit is made to, and the region that it searches (paper, "Parameter fitting").
+"""Targets of fits, and the region that is searched (paper, "Parameter fitting").
 
-The paper's bounded region is seen as a unit cube: (0..1)^3 to delta, kappa_nnn, and kappa_nnnn between its
-lower bound and the upper one that kappa_nnn leaves it.
+The paper's bounded region is mapped to a unit cube: delta, kappa_nnn, and kappa_nnnn between its lower bound
+and the upper bound set by kappa_nnn.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,23 +22,23 @@ RATIOS = ("area_ratio", "width_ratio")
 PARAMETERS = ("delta", "kappa_nnn", "kappa_nnnn")
 
 Measure = Callable[[Sequence[CellParameters]], NDArray[np.float64]]
-"""From n sets of parameters to what is measured there, (n, k); of most, A/A0 and w/w0."""
+"""From n sets of parameters to measured quantities (n, k), mostly A/A0 and w/w0."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What was measured on a tissue; None where it was not."""
+    """The measured ratios of a tissue; None if not measured."""
 
     area_ratio: float | None
     width_ratio: float | None
 
     @property
     def columns(self) -> list[int]:
-        """Which of area and width ratio were measured, by number."""
+        """Indices of the measured ratios."""
         return [column for column, value in enumerate(self._values) if value is not None]
 
     def residuals(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Measured (..., 2) less target (..., 1 or 2), for what the target has."""
+        """Model (..., 2) minus measured (..., 1 or 2), for the measured ratios."""
         wanted = np.array([self._values[column] for column in self.columns], dtype=float)
         return np.asarray(measured[..., self.columns] - wanted)
 
@@ -52,14 +52,14 @@ class Target:
 
 
 def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
-    """The paper's bounded region as a cube: (0..1)^3 to parameters with kappa_nnnn in its bound."""
+    """Parameters at a point of the unit cube."""
     delta, first, second = (float(v) for v in np.clip(unit, 0.0, 1.0))
     kappa_nnn = _inside(KAPPA_NNN, first)
     return CellParameters(_inside(DELTA, delta), kappa_nnn, _inside(_third(kappa_nnn), second))
 
 
 def unit_of(parameters: CellParameters) -> NDArray[np.float64]:
-    """Where parameters lie in the unit cube, (3,): the inverse of `parameters_at`, clipped to the cube."""
+    """Position (3,) of parameters in the unit cube, the inverse of `parameters_at`, clipped to the cube."""
     bounds = (DELTA, KAPPA_NNN, _third(parameters.kappa_nnn))
     values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
     unit = [(v - b.lower) / (b.upper - b.lower) for v, b in zip(values, bounds, strict=True)]
@@ -67,22 +67,22 @@ def unit_of(parameters: CellParameters) -> NDArray[np.float64]:
 
 
 def as_array(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-    """Parameters as numbers (n, 3), in the order of `PARAMETERS`."""
+    """Parameters as an array (n, 3), in the order of `PARAMETERS`."""
     return np.array([(p.delta, p.kappa_nnn, p.kappa_nnnn) for p in parameters])
 
 
 def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     """Density of the paper's distribution at points of the cube (n, 3), (n,), up to a factor.
 
-    delta is uniform, and so are both kappas over their bounded plane: a strip of the plane at kappa_nnn
-    counts by its length.
+    delta is uniform, and so are both kappas over their bounded plane: the density is the length of the strip
+    at a kappa_nnn.
     """
     strips = [_third(_inside(KAPPA_NNN, float(first))) for first in units[:, 1]]
     return np.array([strip.upper - strip.lower for strip in strips])
 
 
 def surrogate_measure(surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
-    """Area and width ratio of a mould's tissue by the surrogate: of one image, or averaged over D4."""
+    """Area and width ratio of a mould's tissue by the surrogate, from one image or averaged over D4."""
     cast = surrogate.cast(mould)
     densities_of = surrogate_densities(surrogate, cast, averaged=averaged)
 

@@ -1,4 +1,4 @@
-"""A tissue fitted by the surrogate, the fit corrected by simulations, and both simulated again."""
+"""A tissue fitted by the surrogate, the fit corrected by simulations, and both verified."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from raptor.moulds.geometry import Mould
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-CORRECTIONS = 6  # simulations: what is not mended by then was not mended by more (docs/fits.md)
+CORRECTIONS = 6  # simulations; more did not help (docs/fits.md)
 
 
 def fit_tissue(
@@ -28,16 +28,16 @@ def fit_tissue(
     corrections: int = CORRECTIONS,
     repeats: int = REPEATS,
 ) -> tuple[Mapping[str, Any], Tissue]:
-    """Both fits as JSON holds them, and the first simulation, with a further seed, at the surrogate's.
+    """Both fits as JSON, and the first simulation, with a new seed, at the surrogate's fit.
 
     Parameters
     ----------
     starts : int
-        As `least_squares.minimise` takes it.
+        As in `least_squares.minimise`.
     corrections : int
-        Simulations by which the fit may be corrected.
+        Largest number of simulations for the correction.
     repeats : int
-        Simulations again, with further seeds, at each fit.
+        Simulations with new seeds at each fit.
     """
     begun = perf_counter()
     cast = surrogate.cast(mould)

@@ -140,7 +140,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
     Raises
     ------
     RaptorError
-        Where there is none.
+        If there is none.
     """
     planes = [_plane(mould, 0.5 * parity) for parity in range(min(layers, 2))]
     heights = (np.arange(layers) + 0.5) / np.sqrt(2)

@@ -1,9 +1,9 @@
 """Random moulds with and without symmetry (paper, "Training Data"; Andrews & Hague 2023).
 
-An outline is a closed curve around the origin, r(angle), either a polygon through random corners
-or a smooth Fourier series; it is made to have the drawn symmetry, scaled to the drawn number of
-cells, and filled with small round tethers placed by the same symmetry. What cannot be cast well
-(a piece cut off, a neck too narrow, a reach out of the image) is drawn again.
+An outline is a closed curve around the origin, r(angle), either a polygon through random corners or a smooth
+Fourier series. It is given a random symmetry, scaled to a random number of cells, and filled with small round
+tethers placed with the same symmetry. Moulds that cannot be cast well (a piece cut off, a neck too narrow, an
+outline outside the image) are rejected.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ from raptor.frame import IMAGE_SIZE
 from raptor.moulds.geometry import Circle, Mould
 from raptor.symmetry import Element
 
-SMOOTH_CORNERS = 96  # corners that draw a smooth outline
+SMOOTH_CORNERS = 96  # corners of a smooth outline
 MAX_ASPECT = 2.6
 ATTEMPTS = 2000
-TETHER_RADIUS = (0.8, 1.5)  # l0, equal within a mould: posts of the experiments are thin beside the tissue
+TETHER_RADIUS = (0.8, 1.5)  # l0, equal within a mould; experimental posts are thin compared with the tissue
 ARM_WIDTH = 4.0  # l0, narrowest neck and gap between tethers: a few cells, so that tissue can pass
-MARGIN = 3.0  # l0, rim of the image that stays free: more than 3 sigma of the raster
+MARGIN = 3.0  # l0, free border of the image: more than 3 sigma of the raster
 SYMMETRY = {"none": 0.18, "mirror": 0.30, "half_turn": 0.22, "mirrors": 0.24, "square": 0.06}
-"""Share of each symmetry class: 4.06 distinct images a mould under D4, as in the paper (4.05)."""
+"""Share of each symmetry class: 4.06 distinct images per mould under D4 (the paper: 4.05)."""
 
 _MIRROR_Y = Element(quarter_turns=2, mirror=True)  # y -> -y
 _MIRROR_X = Element(quarter_turns=0, mirror=True)  # x -> -x
@@ -41,7 +41,7 @@ GROUPS: dict[str, tuple[Element, ...]] = {
 
 
 class RandomMoulds(Block):
-    """What random moulds are drawn from."""
+    """The distribution of random moulds."""
 
     cells: tuple[Positive, Positive] = Field((500, 3000), description="bounds of the number of cells")
     tethers: tuple[int, int] = Field((2, 16), description="bounds of the number of tethers")
@@ -60,14 +60,14 @@ class RandomMoulds(Block):
         Parameters
         ----------
         layers : int
-            Cell layers, which turn a number of cells into an area.
+            Cell layers, which relate the number of cells to the area.
         symmetry : str, optional
-            A key of `GROUPS`; drawn by `SYMMETRY` where it is not given.
+            A key of `GROUPS`; drawn from `SYMMETRY` if not given.
 
         Raises
         ------
         RaptorError
-            Where no mould that meets all bounds was found in many attempts.
+            If no mould that meets all bounds was found in many attempts.
         """
         drawn = str(rng.choice(list(SYMMETRY), p=list(SYMMETRY.values())))
         for _ in range(ATTEMPTS):
@@ -115,13 +115,13 @@ class RandomMoulds(Block):
         for _ in range(200):
             if len(placed) >= count:
                 break
-            # Posts mostly stand near the rim, where they hold the tissue; some stand anywhere.
+            # Most posts stand near the rim, where they hold the tissue; some stand anywhere.
             region = rim if rng.random() < 0.7 and not rim.is_empty else room
             orbit = _orbit(_random_point(rng, region), symmetry, radius)
             if len(placed) + len(orbit) > self.tethers[1]:
                 continue
             if not all(shapely.contains_xy(room, post.x, post.y) for post in orbit):
-                continue  # moved out when it was put on an axis
+                continue  # moved outside when placed on an axis
             if _apart(placed + orbit, 2 * radius + ARM_WIDTH):
                 placed += orbit
         return tuple(placed) if self.tethers[0] <= len(placed) <= self.tethers[1] else None
@@ -168,7 +168,7 @@ def _images(points: NDArray[np.float64], group: tuple[Element, ...]) -> NDArray[
 
 
 def _orbit(point: NDArray[np.float64], symmetry: str, radius: float) -> list[Circle]:
-    """The post and its images; on an axis where the images would overlap."""
+    """The post and its images; on an axis if the images would overlap."""
     x, y = point
     if symmetry != "none":
         x, y = (0.0 if abs(c) < radius * 1.5 else c for c in point)
@@ -196,7 +196,7 @@ def _random_point(rng: Generator, region: shapely.Geometry) -> NDArray[np.float6
 
 
 def _wide_enough(outline: shapely.Polygon, width: float) -> bool:
-    """Whether the outline stays whole, and keeps nearly all its area, when thin arms are removed."""
+    """Whether the outline stays connected and keeps nearly all its area when thin arms are removed."""
     core = outline.buffer(-width / 2)
     if core.is_empty or core.geom_type != "Polygon":
         return False

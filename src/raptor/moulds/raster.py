@@ -26,7 +26,7 @@ def mould_image(mould: Mould, pixels: int) -> MouldImage:
     Raises
     ------
     RaptorError
-        Where the depression covers no pixel.
+        If the depression covers no pixel.
     """
     outline = _strictly_inside(mould.outline, pixels)
     tethers = np.zeros_like(outline)

@@ -38,7 +38,7 @@ def as_mould(mould: Mould | str | Path) -> Mould:
     Raises
     ------
     RaptorError
-        As `read_mould`, and where it is anything else.
+        As `read_mould`, and if it is anything else.
     """
     if isinstance(mould, Mould):
         return mould

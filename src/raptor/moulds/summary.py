@@ -71,7 +71,7 @@ def summarise(mould: Mould, layers: int = 7) -> Summary:
     Raises
     ------
     RaptorError
-        Where it holds no cell.
+        If it holds no cell.
     """
     x0, y0, x1, y1 = mould.outline.bounds
     return Summary(

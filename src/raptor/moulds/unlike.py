@@ -1,6 +1,6 @@
-"""Moulds drawn unlike the random ones that networks learn from: what a surrogate is tried on.
+"""Out-of-distribution moulds, unlike the random ones of the training set, for testing surrogates.
 
-Each is as large as random moulds may be, and has two mirrors.
+Each is as large as random moulds may be and has two mirror axes.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def slender_strips(like: RandomMoulds, rng: Generator, layers: int, name: str) -
 
 
 def _scale(like: RandomMoulds, rng: Generator, outline: shapely.Polygon, layers: int) -> float:
-    """The factor by which an outline has an area that random moulds may have, within the image."""
+    """The factor that scales an outline to an area of random moulds, within the image."""
     area = rng.uniform(*like.cells) / layers
     largest = (IMAGE_SIZE / 2 - MARGIN) / max(map(abs, outline.bounds))
     return float(min(np.sqrt(area / outline.area), largest))

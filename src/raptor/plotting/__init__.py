@@ -1,7 +1,6 @@
-"""Figures. Each function draws onto a new figure from plain data; `save` writes it, and `plot` knows which.
+"""Figures. Each function draws a new figure from plain data; `save` writes it, and `plot` chooses one.
 
-Names are those of `__init__.pyi`; each is imported when it is first used, so that no figure waits for
-another's libraries.
+Names are those of `__init__.pyi`; each is imported on first use, so that no figure loads another's libraries.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Figures of a run, by name: each draws files of the run and gives the data that it shows."""
+"""Figures of a run, by name: each draws files of the run and returns the data shown."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -38,12 +38,12 @@ Stacks = Mapping[str, NDArray[np.floating]]
 
 
 def draw(kind: str, inputs: Mapping[str, Any], stem: Path, **options: Any) -> None:
-    """Draw a figure of `FIGURES` from its files, as PNG, SVG and the data that it shows.
+    """Draw a figure of `FIGURES` from its files, as PNG, SVG and the data shown.
 
     Parameters
     ----------
     inputs
-        Files by the names of the figure's parameters; CSV and JSON are read, of others the path is given.
+        Files by the names of the figure's parameters; CSV and JSON are read, others passed as paths.
     stem : Path
         Of the three files, without a suffix.
     """
@@ -58,7 +58,7 @@ def draw(kind: str, inputs: Mapping[str, Any], stem: Path, **options: Any) -> No
 
 
 def _read(given: Any) -> Any:
-    """A table, the content of a JSON file, a path, or each of several files."""
+    """A table, the content of a JSON file, a path, or a list of these."""
     if not isinstance(given, str):
         return [_read(each) for each in given]
     path = Path(given)
@@ -108,7 +108,7 @@ def _valley(
 
 
 def _fields(samples: Path, moulds: Path) -> Drawn:
-    """The first sample: the one whose error is the median."""
+    """The first sample, that with the median error."""
     _, mould, stacks = next(iter(_samples(samples, moulds)))
     return fields_figure(stacks, mould), _dataset(stacks)
 
@@ -223,4 +223,4 @@ FIGURES: dict[str, Callable[..., Drawn]] = {
     "directors": _directors,
     "fit": _fit,
 }
-"""What draws each figure, from the content of its files."""
+"""The function that draws each figure from the content of its files."""

@@ -1,4 +1,4 @@
-"""The house style, moulds and fields, and figures of data sets and tissues."""
+"""The style of figures; figures of moulds, fields, data sets and tissues."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from raptor.moulds.cast import cast_sites
 from raptor.moulds.geometry import Mould
 from raptor.symmetry import FIELDS
 
-if TYPE_CHECKING:  # what other figures wait for
+if TYPE_CHECKING:  # slow imports that only some figures need
     import pandas as pd
 
     from raptor.condor.simulate import Tissue
@@ -42,14 +42,14 @@ STYLE: dict[Any, Any] = {
     "axes.spines.top": False, "axes.spines.right": False, "figure.dpi": 120, "savefig.dpi": 150,
 }  # fmt: skip
 STYLED = mpl.rc_context(STYLE)
-"""Decorates a function that draws, so that it draws in the house style."""
+"""Decorator of a drawing function: draw in the style of this package."""
 METADATA: dict[str, dict[str, None]] = {".png": {"Software": None}, ".svg": {"Date": None}}
-"""Suffixes of pictures, and what is left out of them so that the same data give the same bytes."""
+"""Suffixes of pictures, and metadata omitted so that the same data give the same bytes."""
 HALF = IMAGE_SIZE / 2
 
 
 class NotebookFigure(Figure):
-    """A figure that a notebook shows as it stands, pyplot or not."""
+    """A figure that a notebook displays without pyplot."""
 
     def _repr_png_(self) -> bytes:
         file = BytesIO()
@@ -75,7 +75,7 @@ def save_picture(figure: Figure, path: Path) -> None:
     Raises
     ------
     RaptorError
-        Where the suffix is another, or the place cannot be written.
+        If the suffix is another, or the file cannot be written.
     """
     require_picture(path)
     with mpl.rc_context(STYLE), atomic_path(path) as temporary:
@@ -83,9 +83,9 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 
 def require_picture(path: Path) -> None:
-    """Raise a RaptorError unless a path's suffix is one of a picture's."""
+    """Raise a RaptorError unless a path has the suffix of a picture."""
     if path.suffix.lower() not in METADATA:
-        raise RaptorError(f"{path} is no picture's name; give one that ends in {' or '.join(METADATA)}")
+        raise RaptorError(f"{path} is not a picture's name; give one that ends in {' or '.join(METADATA)}")
 
 
 def draw_mould(axes: Axes, mould: Mould, *, fill: bool = True) -> None:
@@ -124,9 +124,9 @@ def show_field(axes: Axes, image: NDArray[np.floating], field: str, limit: float
 
 @STYLED
 def fields_figure(stacks: Mapping[str, NDArray[np.floating]], mould: Mould) -> Figure:
-    """The paper's first figure: a mould, and its eight fields, one or several stacks (8, y, x) by source.
+    """The paper's first figure: a mould and its eight fields, from one or several stacks (8, y, x) by source.
 
-    Colours of a field are those of the first stack.
+    The colour scale of a field is that of the first stack.
     """
     count = len(stacks)
     figure = new_figure(11.0, 0.4 + 3.0 * count)
@@ -155,9 +155,9 @@ def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = Non
     Parameters
     ----------
     rows : mapping
-        What the title says, by name.
+        Content of the title, by name.
     like : Mould, optional
-        Another mould, whose outline is drawn beside this one's, dashed.
+        Another mould, whose outline is drawn dashed.
     """
     figure = new_figure(5.2, 5.8)
     axes = figure.add_subplot()
@@ -169,7 +169,7 @@ def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = Non
             axes.plot(*np.asarray(shape.exterior.coords).T, "--", color=PREDICTED, lw=1)
     axes.plot([-HALF + 2, -HALF + 12], [-HALF + 2] * 2, "-", color="black", lw=2, solid_capstyle="butt")
     axes.text(-HALF + 7, -HALF + 2.8, "10 $l_0$", ha="center", va="bottom")
-    axes.spines[:].set_visible(True)  # the frame is part of what the model sees
+    axes.spines[:].set_visible(True)  # the frame is part of the model's input
     width = max(len(name) for name in rows)
     table = [f"{name:>{width}}  {value}" for name, value in rows.items()]
     axes.set_title("\n".join(table), loc="left", family="monospace", fontsize=8)
@@ -201,12 +201,12 @@ def scatter(axes: Axes, simulated: "pd.Series", predicted: "pd.Series") -> None:
 
 @STYLED
 def design_figure(table: "pd.DataFrame", moulds: Sequence[Mould]) -> Figure:
-    """Distributions of a design, and moulds drawn.
+    """Distributions of a design, and some of its moulds.
 
     Parameters
     ----------
     table : DataFrame
-        The design, a row a simulation, with the mould's `area` (l0^2), `tethers` and `symmetry`.
+        The design, one row per simulation, with the mould's `area` (l0^2), `tethers` and `symmetry`.
     moulds : sequence of Mould
         Moulds to draw.
     """
@@ -228,7 +228,7 @@ def design_figure(table: "pd.DataFrame", moulds: Sequence[Mould]) -> Figure:
     panels[2].set(xlabel="area of the depression ($l_0^2$)")
     tethers, counts = np.unique(table["tethers"], return_counts=True)
     panels[3].bar(tethers, counts, color=SIMULATED)
-    panels[3].set(xlabel="tethers a mould")
+    panels[3].set(xlabel="tethers per mould")
     names, counts = np.unique(table["symmetry"], return_counts=True)
     panels[4].barh([name.replace("_", " ") for name in names], counts, color=SIMULATED)
     panels[4].set(xlabel="moulds by symmetry class")
@@ -240,9 +240,9 @@ def design_figure(table: "pd.DataFrame", moulds: Sequence[Mould]) -> Figure:
 
 @STYLED
 def tradeoff_figure(table: "pd.DataFrame") -> Figure:
-    """Error of density, and energy, against cost: one small point a case, a large median a method.
+    """Error of density and energy against cost: one small point per case, a large one for the median.
 
-    Energies less than 0.1 % above the best are drawn at 0.1 %.
+    Energies less than 0.1 % above the lowest are drawn at 0.1 %.
     """
     table = table.assign(method=table["method"].str.replace(r", seed \d+", "", regex=True))
     shown = table[~table["method"].str.contains(r"layers|shells|pixels|minimised")]
@@ -267,11 +267,11 @@ def tradeoff_figure(table: "pd.DataFrame") -> Figure:
         anneals = sorted((x, y) for method, x, y in means if re.fullmatch(r"anneal-[\de]+", method))
         if anneals:
             axes.plot(*np.transpose(anneals), "-", color=_method_colour("anneal"), lw=1, zorder=0)
-        axes.set(xscale="log", yscale="log", xlabel="core-seconds a run")
+        axes.set(xscale="log", yscale="log", xlabel="core-seconds per run")
         axes.margins(x=0.15, y=0.1)
     panels[0].axhline(1.0, color=THIRD, ls="--", lw=0.8)
     panels[0].set_ylabel("density error / seed-to-seed spread")
-    panels[1].set_ylabel("energy above the best unfolded, relative")
+    panels[1].set_ylabel("relative energy above the lowest unfolded")
     return figure
 
 
@@ -279,7 +279,7 @@ def tradeoff_figure(table: "pd.DataFrame") -> Figure:
 def folding_figure(
     tissues: Mapping[str, "Tissue"], shares: Mapping[str, NDArray[np.float64]], mould: Mould
 ) -> Figure:
-    """Tissues from above, cells coloured by the share (cells,) of their bonds that are reversed."""
+    """Tissues from above, cells coloured by the share (cells,) of their bonds that are inverted."""
     figure = new_figure(9.0, 3.2)
     panels = figure.subplots(1, len(tissues), sharex=True, sharey=True)
     for axes, (name, s) in zip(panels, tissues.items(), strict=True):
@@ -296,7 +296,7 @@ def folding_figure(
         )
         axes.set_xlabel("$x$ / $l_0$")
     panels[0].set_ylabel("$y$ / $l_0$")
-    figure.colorbar(points, ax=panels, label="share of a cell's bonds reversed", shrink=0.8)
+    figure.colorbar(points, ax=panels, label="share of a cell's bonds inverted", shrink=0.8)
     return figure
 
 

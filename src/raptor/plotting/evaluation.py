@@ -1,4 +1,4 @@
-"""Figures of how good surrogates are."""
+"""Figures of the errors of surrogates."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -30,7 +30,7 @@ COLOURS = (
 
 @STYLED
 def training_figure(history: pd.DataFrame) -> Figure:
-    """Loss and validation error, epoch by epoch, a line a member; the kept weights are marked."""
+    """Loss and validation error by epoch, one line per network; the kept weights are marked."""
     figure = new_figure(9.0, 3.0)
     losses, errors = figure.subplots(1, 2)
     kept = []
@@ -52,7 +52,7 @@ def training_figure(history: pd.DataFrame) -> Figure:
 
 @STYLED
 def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
-    """Share of simulations that bands hold, against what they promise; error against band of both ratios."""
+    """Coverage of the bands against their nominal levels; error against band of both ratios."""
     figure = new_figure(11.0, 3.6)
     panels = figure.subplots(1, 3)
     names = [*FIELDS, *SHAPE_LABELS]
@@ -64,7 +64,7 @@ def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Fig
         panels[0].axhline(promised, color=colour, lw=0.8, ls="--")
         panels[0].plot(range(len(names)), found, "o", color=colour, label=f"{100 * promised:.0f} % band")
     panels[0].set_xticks(range(len(names)), [labels[name] for name in names], rotation=60)
-    panels[0].set(ylabel="share of simulations held", ylim=(0, 1.02))
+    panels[0].set(ylabel="share covered", ylim=(0, 1.02))
     panels[0].legend(frameon=False, fontsize=7, loc="lower left")
     for axes, (name, label) in zip(panels[1:], SHAPE_LABELS.items(), strict=True):
         error = (metrics[f"{name}_predicted"] - metrics[f"{name}_simulated"]).abs()
@@ -92,7 +92,7 @@ def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Fig
 
 @STYLED
 def regions_figure(metrics: pd.DataFrame, regions: pd.DataFrame) -> Figure:
-    """Where in the parameters errors are large, and their means by region and on further sets."""
+    """Errors over the parameters, and their means by region and campaign."""
     figure = new_figure(12.0, 4.0)
     where, fields, shapes = figure.subplots(1, 3, width_ratios=[1.3, 1, 1])
     order = metrics.sort_values("vrmse_density")
@@ -121,7 +121,7 @@ def regions_figure(metrics: pd.DataFrame, regions: pd.DataFrame) -> Figure:
 
 @STYLED
 def active_learning_figure(regions: pd.DataFrame) -> Figure:
-    """Errors by region of models trained without and with further simulations, a bar a model."""
+    """Errors by region of models trained without and with further simulations, one bar per model."""
     figure = new_figure(12.0, 4.6)
     panels = figure.subplots(1, 3, sharey=True)
     models = list(dict.fromkeys(regions["model"]))
@@ -146,7 +146,7 @@ def active_learning_figure(regions: pd.DataFrame) -> Figure:
 def worst_figure(
     cases: Sequence[tuple[str, Mould, NDArray[np.floating], NDArray[np.floating]]],
 ) -> Figure:
-    """Densities (y, x) of held-out cases, simulated above and predicted below, each with its title."""
+    """Densities (y, x) of held-out cases, simulated above predicted, with titles."""
     figure = new_figure(12.0, 8.6)
     columns = 6
     blocks = -(-len(cases) // columns)
@@ -169,7 +169,7 @@ def worst_figure(
 
 @STYLED
 def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) -> Figure:
-    """Validation error over the minutes of training, and errors against the time of a prediction."""
+    """Validation error against training time, and errors against prediction time."""
     figure = new_figure(12.0, 3.8)
     training, cost, floors = figure.subplots(1, 3)
     colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(table["model"])}
@@ -194,7 +194,7 @@ def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) ->
         )
     cost.set(
         xscale="log",
-        xlabel="milliseconds of a prediction, all members and images",
+        xlabel="milliseconds per prediction, whole ensemble and all images",
         ylabel="VRMSE of density",
         ylim=(0, None),
     )
@@ -218,6 +218,6 @@ def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) ->
         )
     floors.axhline(1.0, color=THIRD, ls="--", lw=0.8)
     floors.set_xticks(range(len(quantities)), list(quantities.values()))
-    floors.set(ylabel="error / noise from seed to seed", yscale="log")
+    floors.set(ylabel="error / noise floor", yscale="log")
     floors.legend(frameon=False, fontsize=6, ncols=2)
     return figure

@@ -29,7 +29,7 @@ PARAMETER_LABELS = {
     "kappa_nnnn": r"$\kappa_{NNNN}/\kappa_0$",
 }
 COLOURS = (THIRD, PREDICTED, SIMULATED, "#3c8a5a", "#8a3355")
-LIMIT = -chi2.ppf(0.95, 1) / 2  # of a log profile likelihood, where the 95 % interval ends
+LIMIT = -chi2.ppf(0.95, 1) / 2  # log profile likelihood at the ends of the 95 % interval
 
 
 @STYLED
@@ -39,7 +39,7 @@ def fit_figure(
     thresholds: Mapping[str, float],
     rows: Sequence[Mapping[str, Any]],
 ) -> Figure:
-    """Densities (y, x) of a fitted tissue in its mould, outlined at thresholds; ratios beside the target."""
+    """Densities (y, x) of a fitted tissue in its mould, with contours; ratios beside the target."""
     figure = new_figure(3.5 * (len(densities) + 1), 3.4)
     panels = figure.subplots(1, len(densities) + 1)
     limit = max(float(density.max()) for density in densities.values())
@@ -72,7 +72,7 @@ def valley_figure(
     posterior: Mapping[str, Any],
     marks: Mapping[str, Mapping[str, float]],
 ) -> Figure:
-    """What two ratios leave open: draws from the posterior, profile likelihoods, what would narrow it.
+    """What two ratios leave open: posterior draws, profile likelihoods, value of further measurements.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ def valley_figure(
     draws : DataFrame
         Those that were simulated, with `area_ratio`.
     further : DataFrame
-        As `fitting.rank_measurements` gives it.
+        From `fitting.rank_measurements`.
     posterior : mapping
-        As `fitting.summarise` gives it.
+        From `fitting.summarise`.
     marks : mapping
         Fits to mark, parameters by name.
     """
@@ -100,7 +100,7 @@ def valley_figure(
 def _draw_valley(
     axes: Axes, points: pd.DataFrame, draws: pd.DataFrame, marks: Mapping[str, Mapping[str, float]]
 ) -> None:
-    """Draws from the posterior over delta and kappa_nnn, simulations among them, and fits."""
+    """Posterior draws over delta and kappa_nnn, with simulations and fits."""
     axes.plot(points["delta"], points["kappa_nnn"], ".", ms=3, color=THIRD, alpha=0.35, rasterized=True)
     for (name, mark), shape in zip(marks.items(), "s*D", strict=False):
         axes.plot(mark["delta"], mark["kappa_nnn"], shape, ms=9, mec="black", color=PREDICTED, label=name)
@@ -126,17 +126,17 @@ def _draw_profiles(axes: Axes, posterior: Mapping[str, Any]) -> None:
         part = (values - values[0]) / (values[-1] - values[0])
         axes.plot(part, heights, "-", color=colour, label=PARAMETER_LABELS[name])
     axes.axhline(LIMIT, ls="--", lw=0.8, color=THIRD)
-    axes.set(ylim=(-6, 0.3), xlabel="place in the parameter's range", ylabel="log profile likelihood")
-    axes.set_title("" if posterior["reachable"] else "not reachable on this mould: intervals mean nothing")
+    axes.set(ylim=(-6, 0.3), xlabel="position in the parameter's range", ylabel="log profile likelihood")
+    axes.set_title("" if posterior["reachable"] else "not reachable on this mould: intervals are meaningless")
     axes.legend(frameon=False, fontsize=8, loc="lower center")
 
 
 def _draw_further(axes: Axes, further: pd.DataFrame) -> None:
-    """What each further measurement leaves of the parameters' deviations."""
+    """Relative deviations of the parameters after each further measurement."""
     table = further[::-1]
     places = np.arange(len(table))
     axes.barh(places, table["left"], 0.8, color=SIMULATED)
     axes.barh(places, table["left_exact_model"], 0.35, color="#b9c6e3")
     axes.set_yticks(places, table["label"].tolist(), fontsize=8)
     axes.axvline(1.0, ls="--", lw=0.8, color=THIRD)
-    axes.set(xlabel="deviation left after one more measurement", xlim=(0, 1.1))
+    axes.set(xlabel="relative deviation after one more measurement", xlim=(0, 1.1))

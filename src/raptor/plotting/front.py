@@ -1,4 +1,4 @@
-"""The front door: a picture of whatever the package gives."""
+"""`plot`: a picture of any result of the package."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,17 +27,17 @@ def plot(what: Any) -> Figure:
     Parameters
     ----------
     what : Mould, Tissue, Prediction, Dataset of fields, FittedTissue, MeasuredPhotograph, str or Path
-        A string or a path is a mould: a name of the library or a file.
+        A string or a path is a mould: a library name or a file.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Its method `savefig` writes it; a notebook shows it as it stands.
+        Its method `savefig` writes it; a notebook displays it.
 
     Raises
     ------
     RaptorError
-        Where there is no picture of what is given.
+        If objects of this type cannot be drawn.
     """
     if isinstance(what, (str, Path)):
         what = read_mould(what)
@@ -54,7 +54,7 @@ def plot(what: Any) -> Figure:
     if hasattr(what, "data_vars"):
         return draw_fields(what)
     raise RaptorError(
-        f"there is no picture of type {type(what).__name__}; give a mould, a tissue or its fields"
+        f"cannot draw an object of type {type(what).__name__}; give a mould, a tissue or its fields"
     )
 
 

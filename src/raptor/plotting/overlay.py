@@ -1,4 +1,4 @@
-"""A picture to check a measurement by eye."""
+"""A picture for checking a measurement by eye."""
 
 import numpy as np
 import shapely
@@ -13,12 +13,12 @@ from raptor.moulds import Mould
 from raptor.moulds.cast import central_section
 from raptor.plotting.drawing import PREDICTED, SIMULATED, STYLED, THIRD, new_figure
 
-MOULD, OUTLINE, SECTION = "#4fb3ff", "#ff3b30", "#ffd60a"  # told apart on grey
+MOULD, OUTLINE, SECTION = "#4fb3ff", "#ff3b30", "#ffd60a"  # distinguishable on grey
 
 
 @STYLED
 def overlay_figure(picture: Picture, mould: Mould, measurement: Measurement) -> Figure:
-    """The picture under mould, outline and central section; brightness in the depression, threshold."""
+    """The picture with mould, outline and central section; histogram of brightness, with the threshold."""
     figure = new_figure(9.0, 4.2)
     axes, histogram = figure.subplots(1, 2, width_ratios=[1.7, 1])
     registration = measurement.registration
@@ -58,7 +58,7 @@ def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
         axes.hist(values, bins=list(bins), color=colour, label=name)
     axes.axvline(measurement.threshold, color=THIRD, ls="--", label=f"threshold {measurement.threshold:.3g}")
     axes.set(
-        xlabel="brightness over that of the plate, light evened", ylabel="pixels of the depression", yticks=[]
+        xlabel="brightness relative to the plate, corrected", ylabel="pixels of the depression", yticks=[]
     )
     axes.legend(frameon=False, fontsize=7)
 

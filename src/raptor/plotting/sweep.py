@@ -22,12 +22,12 @@ MEASURE_LABELS = {
     "area": r"decrease of the area, $100\,(1 - A/A_0)$ (%)",
 }
 RATIO = r"$\kappa_{NNNN}/\kappa_{NNN}$"
-APART = 0.006  # of Delta, by which points of one Delta are drawn beside each other
-RIM = 1.5  # l0 shown about a mould
+APART = 0.006  # in Delta, horizontal offset between points of the same Delta
+RIM = 1.5  # l0 shown around a mould
 
 
 def ordered_colours(values: Sequence[float]) -> dict[float, Any]:
-    """A colour for each of some ascending values, from a perceptually uniform map."""
+    """A colour for each of several ascending values, from a perceptually uniform map."""
     colours = mpl.colormaps["viridis"](np.linspace(0.0, 0.82, len(values)))
     return dict(zip(values, map(tuple, colours), strict=True))
 
@@ -60,7 +60,7 @@ def contraction_figure(table: pd.DataFrame) -> Figure:
 
 
 def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int, apart: float) -> None:
-    """One set of spring constants: simulated points, predicted line and band, which ends at 0 and 100 %."""
+    """One set of spring constants: simulated points, predicted line and band, clipped to 0 and 100 %."""
     delta, predicted, band = curve["delta"], curve["predicted"], curve["band95"]
     low, high = (predicted - band).clip(np.minimum(predicted, 0)), (predicted + band).clip(upper=100)
     axes.fill_between(delta, low, high, color=colour, alpha=0.12, lw=0)
@@ -74,7 +74,7 @@ def _curve(axes: Axes, curve: pd.DataFrame, colour: Any, style: int, apart: floa
 def _legend(
     figure: Figure, colours: Mapping[float, Any], ratios: Sequence[float], *, predicted: bool
 ) -> None:
-    """Colours of kappa_nnn, line styles of the ratio, and what points and lines are."""
+    """Colours of kappa_nnn, line styles of the ratio, and the meaning of points and lines."""
     handles = [
         Line2D([], [], color=colour, lw=3, label=rf"$\kappa_{{NNN}}/\kappa_0$ = {kappa:g}")
         for kappa, colour in colours.items()
@@ -92,7 +92,7 @@ def _legend(
 
 @STYLED
 def panels_figure(panels: Sequence[Panel], mould: Mould) -> Figure:
-    """The paper's density panels: simulated over predicted, a block a Delta, on one scale."""
+    """The paper's density panels: simulated above predicted, one block per Delta, on one scale."""
     deltas, kappas, ratios = (sorted({p.point[axis] for p in panels}) for axis in range(3))
     sources = list(panels[0].sources)
     limit = max(float(np.percentile(p.sources["simulated"][0], 99.8)) for p in panels)
@@ -123,7 +123,7 @@ def panels_figure(panels: Sequence[Panel], mould: Mould) -> Figure:
 
 
 def _panel(axes: Axes, density: NDArray[np.floating] | None, mould: Mould, limit: float) -> Any:
-    """A density (y, x) in its mould; an empty frame where there is none."""
+    """A density (y, x) in its mould; an empty frame if there is none."""
     image = None if density is None else show_field(axes, density, "density", limit)
     draw_mould(axes, mould, fill=False)
     x0, y0, x1, y1 = mould.outline.bounds
@@ -133,9 +133,9 @@ def _panel(axes: Axes, density: NDArray[np.floating] | None, mould: Mould, limit
 
 @STYLED
 def directors_figure(rows: Sequence[tuple[Panel, Mould]], thresholds: Mapping[str, float]) -> Figure:
-    """Directors over density, a row a tissue: simulated left, predicted right; length by anisotropy.
+    """Directors over density, one row per tissue: simulated left, predicted right; length by anisotropy.
 
-    Directors are drawn where density per pixel is above the threshold of their source.
+    Directors are drawn where density is above the threshold of their source.
     """
     sources = list(rows[0][0].sources)
     figure = new_figure(5.25 * len(sources), 0.5 + 2.9 * len(rows))
@@ -155,7 +155,7 @@ def directors_figure(rows: Sequence[tuple[Panel, Mould]], thresholds: Mapping[st
 
 
 def draw_directors(axes: Axes, found: Directors) -> None:
-    """Each director as a line, as long as its square is wide where anisotropy is 1."""
+    """Each director as a line, as long as its square is wide if anisotropy is 1."""
     x, y = np.meshgrid(found.centres, found.centres)
     tissue = np.isfinite(found.anisotropy)
     x, y, angle = x[tissue], y[tissue], found.angle[tissue]

@@ -1,1 +1,1 @@
-"""What simulations and surrogates are asked: evaluation, sweeps, speed against accuracy, active learning."""
+"""Studies of simulations and surrogates: evaluation, sweeps, speed against accuracy, active learning."""

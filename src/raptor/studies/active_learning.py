@@ -1,4 +1,4 @@
-"""Where to spend further simulations: where the networks of an ensemble disagree most."""
+"""Active learning: runs about which the networks of an ensemble disagree most."""
 
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:  # tables and figures do not wait for torch
 
 
 def disagreement_of(surrogate: "Surrogate") -> Score:
-    """How far a surrogate's networks disagree about density, as a score of runs."""
+    """Score of runs: the disagreement of a surrogate's networks about density."""
 
     def score(mould: Mould, parameters: CellParameters) -> float:
         found = surrogate.ensemble(mould, parameters)

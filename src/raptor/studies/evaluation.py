@@ -1,4 +1,4 @@
-"""How good a surrogate is on held-out simulations, in itself and in multiples of the noise floor."""
+"""Errors of surrogates on held-out simulations, absolute and relative to the noise floor."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -39,7 +39,7 @@ REGIONS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
         (table["delta"] >= 0.8) & (table["kappa_nnn"] < 0.3)
     ),
 }
-"""Regions of the parameters by which errors are told, each a mask of a table's rows."""
+"""Regions of the parameters, each a mask of a table's rows."""
 
 Guess = NDArray[np.floating] | Prediction
 Predictor = Callable[[Sample, CastMould], Guess]
@@ -52,7 +52,7 @@ def sample_measures(fields: NDArray[np.floating], cast: CastMould) -> dict[str, 
 
 
 def predictor_of(surrogate: "Surrogate") -> Predictor:
-    """A surrogate's answer to a sample: with its bands, where it is calibrated."""
+    """A surrogate's prediction of a sample, with bands if it is calibrated."""
 
     def answer(sample: Sample, cast: CastMould) -> Guess:
         if surrogate.calibration is not None:
@@ -66,13 +66,13 @@ def predictor_of(surrogate: "Surrogate") -> Predictor:
 def field_errors(
     prediction: NDArray[np.floating], target: NDArray[np.floating], sample: Sample
 ) -> dict[str, float]:
-    """Errors `ERRORS` of each field (8, y, x), whole and within the depression, and of density in tethers.
+    """Errors `ERRORS` of each field (8, y, x), over the image and the depression, and of density in tethers.
 
     sxsz and sysz are compared by magnitude.
     """
     ours, theirs = without_sign(prediction), without_sign(target)
     inside = sample.depression.astype(bool)
-    # A mask makes each field a single row of pixels.
+    # A mask turns each field into a single row of pixels.
     masked = vrmse(ours[:, inside][:, None], theirs[:, inside][:, None])
     errors: list[Sequence[float]] = [
         list(vrmse(ours, theirs)), list(masked), list(nrmse(ours, theirs)), field_pearson(ours, theirs)
@@ -102,9 +102,9 @@ def evaluate(
 ) -> pd.DataFrame:
     """Errors and measures of every test sample of a stack, one row each.
 
-    Columns: what identifies the sample; `vrmse_`, `masked_vrmse_`, `nrmse_` and `pearson_` of each field;
-    `tether_error`; each of `MEASURES` as simulated and as predicted; where predictions have bands, the share
-    of pixels that each band holds (`cover95_density`), whether it holds A/A0 and w/w0, and the flag.
+    Columns: those that identify the sample; `vrmse_`, `masked_vrmse_`, `nrmse_` and `pearson_` of each field;
+    `tether_error`; each of `MEASURES`, simulated and predicted; with bands, the share of pixels that each
+    covers (`cover95_density`), whether it covers A/A0 and w/w0, and the flag.
     """
     rows = []
     for sample in read_samples(stack, read_table(stack).rows("test")):
@@ -127,7 +127,7 @@ def evaluate(
 
 
 def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What the bands hold, and the flag."""
+    """Coverage of the bands, and the flag."""
     inside = sample.depression.astype(bool)
     held = guess.field_bands.hold(without_sign(guess.values) - without_sign(sample.fields))
     true = np.array([row[f"{name}_simulated"] for name in SHAPES])
@@ -149,10 +149,10 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
 
 
 def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:
-    """Seed-to-seed noise of each mould that was simulated again, one row each, under `evaluate`'s names.
+    """Seed-to-seed noise of each repeated mould, one row each, with the columns of `evaluate`.
 
-    Every pair of runs is compared as a prediction with its target would be; errors over sqrt 2 are those of
-    the best prediction possible, the mean of very many runs. Of measures the standard deviation.
+    Every pair of runs is compared as a prediction with its target; errors over sqrt 2 are those of the best
+    possible prediction, the mean of many runs. Of measures, the standard deviation.
     """
     table, again = read_table(stack), read_table(repeats)
     rows = []
@@ -173,7 +173,7 @@ def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould], layers:
 
 
 def in_floors(metrics: pd.DataFrame, floor: pd.DataFrame) -> dict[str, float]:
-    """Mean errors of a model over the mean noise of the same moulds: 1 is the best there can be.
+    """Mean errors of a model over the mean noise of the same moulds: 1 is the best possible.
 
     Fields by VRMSE; measures by root mean square error over root mean variance.
     """
@@ -188,7 +188,7 @@ def in_floors(metrics: pd.DataFrame, floor: pd.DataFrame) -> dict[str, float]:
 
 
 def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[str, Any]:
-    """Means over a set: of fields, of bulk measures, of bands, and in multiples of the floor."""
+    """Means over a set of samples: fields, bulk measures, bands, and errors over the noise floor."""
     fields = {
         field: {name: float(metrics[f"{name}_{field}"].mean()) for name in ERRORS}
         | {f"median_{name}": float(metrics[f"{name}_{field}"].median()) for name in ERRORS}
@@ -234,7 +234,7 @@ def regions_of(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def median_and_worst(metrics: pd.DataFrame) -> list[int]:
-    """Simulations to be drawn: the one whose error of density is the median, then the worst."""
+    """Simulations to be drawn: that with the median error of density, then the worst."""
     ordered = metrics.sort_values("vrmse_density")["simulation"].tolist()
     return [ordered[len(ordered) // 2], *worst(metrics)["simulation"].tolist()]
 
@@ -273,7 +273,7 @@ def worst(metrics: pd.DataFrame, count: int = 12) -> pd.DataFrame:
 
 
 def agreement(metrics: pd.DataFrame, name: str) -> dict[str, float]:
-    """Predicted against simulated; cases without the measure (no material there) are left out."""
+    """Predicted against simulated, without cases that lack the measure (no material there)."""
     pair = metrics[[f"{name}_simulated", f"{name}_predicted"]].dropna().to_numpy()
     if len(pair) < 2:
         nothing = dict.fromkeys(("pearson", "slope", "rmse", "mae", "bias"), float("nan"))
@@ -292,7 +292,7 @@ def agreement(metrics: pd.DataFrame, name: str) -> dict[str, float]:
 
 
 def compare(summaries: Mapping[str, Mapping[str, Any]], costs: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
-    """One row a model: its cost, and its errors in themselves and in multiples of the floor."""
+    """One row per model: its cost, and its errors, absolute and over the noise floor."""
     rows = []
     for cost in costs:
         summary = summaries[cost["model"]]

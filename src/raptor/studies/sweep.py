@@ -1,4 +1,4 @@
-"""Contraction over a grid of parameters: what was simulated, what is predicted, and how far they differ."""
+"""Contraction over a grid of parameters, simulated and predicted."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 POINT = ["mould", "delta", "kappa_nnn", "ratio"]
 SHAPES = ("area_ratio", "width_ratio")
 MEASURES = {"width": "width_ratio", "area": "area_ratio"}
-"""Percentage decreases, and the ratio that each follows from."""
+"""Percentage decreases, and the ratio from which each is computed."""
 Point = tuple[float, float, float]
 """Delta, kappa_nnn, kappa_nnnn / kappa_nnn."""
 SHOWN = (0.5, 0.9)
-"""Values of delta of which tissues are drawn, as in the paper, or those nearest to them."""
+"""Values of delta whose tissues are drawn, as in the paper, or the nearest ones."""
 
 
 def ratio_of(parameters: CellParameters) -> float:
@@ -37,12 +37,12 @@ def ratio_of(parameters: CellParameters) -> float:
 
 
 def tabulate(stack: Path) -> pd.DataFrame:
-    """A/A0 and w/w0 of every simulation of a campaign's stack, one row each; those that failed have none.
+    """A/A0 and w/w0 of every simulation of a campaign's stack, one row each, without failed ones.
 
     Raises
     ------
     RaptorError
-        Where the file is missing or is no stack.
+        If the file is missing or is no stack.
     """
     table = read_table(stack)
     columns: dict[str, Any] = {"simulation": table.simulation, "mould": table.mould}
@@ -58,14 +58,14 @@ def predict(
     moulds: Mapping[str, Mould],
     on_progress: Callable[[str], None] = lambda point: None,
 ) -> tuple[pd.DataFrame, dict[int, NDArray[np.float32]]]:
-    """A/A0 and w/w0, with their 95 % bands, at every point of a campaign, and fields (8, y, x) to be drawn.
+    """A/A0 and w/w0 with 95 % bands at every point of a campaign, and fields (8, y, x) to be drawn.
 
     Fields by row of the table, at the values of delta nearest to `SHOWN`.
 
     Raises
     ------
     RaptorError
-        Where the surrogate is not calibrated.
+        If the surrogate is not calibrated.
     """
     widest, shown = LEVELS.index(0.95), shown_deltas([run.parameters.delta for run in runs])
     casts = {name: surrogate.cast(mould) for name, mould in moulds.items()}
@@ -86,11 +86,11 @@ def predict(
 
 
 def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) -> pd.DataFrame:
-    """Contraction in per cent, simulated and predicted: a row for each point and measure.
+    """Contraction in per cent, simulated and predicted, one row per point and measure.
 
     Columns: `mould`, `measure` (width or area), the point, `simulated` (mean over seeds), `spread` (standard
-    deviation over seeds, NaN of a single one), `seeds`, `predicted`, `band95`, `difference` (predicted less
-    simulated), `within_band` (whether the band holds the mean) and `unlike`, the surrogate's own warning.
+    deviation over seeds, NaN for a single one), `seeds`, `predicted`, `band95`, `difference` (predicted minus
+    simulated), `within_band` (whether the band covers the mean) and `unlike`, the surrogate's own warning.
     Without a prediction the last ones are empty.
     """
     if predicted is None:
@@ -114,7 +114,7 @@ def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) 
 
 
 def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """For each mould and measure of `contraction`: the largest difference and where it is, and the means.
+    """For each mould and measure of `contraction`, the largest difference, its position, and the means.
 
     Differences in percentage points; `spread` is the root mean variance over seeds.
     """
@@ -136,18 +136,18 @@ def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _finite(value: float) -> float | None:
-    """A number as JSON has it."""
+    """A number in the types of JSON."""
     return float(value) if np.isfinite(value) else None
 
 
 def shown_deltas(deltas: Sequence[float]) -> tuple[float, ...]:
-    """Those values of delta that are nearest to `SHOWN`."""
+    """The values of delta nearest to `SHOWN`."""
     return tuple(sorted({min(deltas, key=lambda delta: abs(delta - wanted)) for wanted in SHOWN}))
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Fields (8, y, x) at one point of a sweep, by source: of the first seed's simulation, and predicted."""
+    """Fields (8, y, x) at one point of a sweep, by source: simulated with the first seed, and predicted."""
 
     mould: str
     point: Point
@@ -174,12 +174,12 @@ def write_predicted(
 def read_panels(
     stack: Path, mould: str, predicted: Path | None = None
 ) -> tuple[list[Panel], dict[str, float]]:
-    """Tissues of one mould to be drawn, without those whose simulation failed, and thresholds by source.
+    """Tissues of one mould to be drawn, without failed simulations, and thresholds by source.
 
     Raises
     ------
     RaptorError
-        Where all of them failed, or a file cannot be read.
+        If all of them failed, or a file cannot be read.
     """
     table = read_table(stack)
     first: dict[Point, int] = {}
@@ -188,7 +188,7 @@ def read_panels(
             point = (parameters.delta, parameters.kappa_nnn, ratio_of(parameters))
             first.setdefault(point, row)
     if not first:
-        raise RaptorError(f"every simulation of {mould} failed; see the logs of simulate_shard for why")
+        raise RaptorError(f"every simulation of {mould} failed; see the logs of simulate_shard")
     shown = shown_deltas([point[0] for point in first])
     chosen = {point: row for point, row in first.items() if point[0] in shown}
     of_surrogate, thresholds = _read_predicted(predicted, mould) if predicted else ({}, {})
@@ -214,7 +214,7 @@ def _read_predicted(path: Path, mould: str) -> tuple[dict[Point, NDArray[np.floa
 
 
 def middle_points(panels: Sequence[Panel]) -> list[Panel]:
-    """The tissues in the middle of the spring constants, of each value of delta."""
+    """For each value of delta, the tissue in the middle of the spring constants."""
     kappas, ratios = (sorted({panel.point[axis] for panel in panels}) for axis in (1, 2))
     middle = (kappas[len(kappas) // 2], ratios[len(ratios) // 2])
     return [panel for panel in panels if panel.point[1:] == middle]

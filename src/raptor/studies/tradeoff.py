@@ -1,4 +1,4 @@
-"""Speed against accuracy: what each way to a tissue's fields costs and gets wrong."""
+"""Speed against accuracy: cost and errors of each way to a tissue's fields."""
 
 import re
 import time
@@ -26,13 +26,13 @@ from raptor.raster import rasterise
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-REFERENCES = 4  # runs of the reference, of different seeds, by which the spread is measured
+REFERENCES = 4  # reference runs with different seeds, to measure the spread
 SURROGATE = "surrogate"
 
 
 @dataclass(frozen=True)
 class Variant:
-    """The `standard` run in another model or on another raster; what is None stays."""
+    """The `standard` run with another model or raster; None leaves a property unchanged."""
 
     layers: int | None = None
     shells: tuple[int, int, int] | None = None
@@ -40,12 +40,12 @@ class Variant:
 
 
 def variant_named(method: str) -> Variant | None:
-    """The variant that a method's name states: "3 layers", "shells 1 2 4", "64 pixels"; None of any other.
+    """The variant named by a method: "3 layers", "shells 1 2 4", "64 pixels"; None for any other name.
 
     Raises
     ------
     RaptorError
-        Where there is no such network of cells.
+        If there is no such network of cells.
     """
     if found := re.fullmatch(r"([1-9]\d?) layers", method):
         NetworkModel(int(found[1]))
@@ -68,11 +68,11 @@ def _method(name: str) -> str:
 class Case(Block):
     """A mould and parameters to compare on."""
 
-    mould: str = Field(description="name of a mould of the library, or a mould file")
+    mould: str = Field(description="a library mould by name, or a mould file")
     delta: float = Field(description="cell-matrix interaction")
-    kappa_nnn: float = Field(description="second spring constant, kappa0")
-    kappa_nnnn: float = Field(description="third spring constant, kappa0")
-    layers: int | None = Field(None, ge=1, le=64, description="where it is not layers")
+    kappa_nnn: float = Field(description="second-shell spring constant, kappa0")
+    kappa_nnnn: float = Field(description="third-shell spring constant, kappa0")
+    layers: int | None = Field(None, ge=1, le=64, description="number of layers; null: the key layers")
 
     @model_validator(mode="after")
     def _allowed(self) -> "Case":
@@ -91,7 +91,7 @@ class Tradeoff(Block):
 
     methods: tuple[Annotated[str, AfterValidator(_method)], ...] = Field(
         ("draft", "standard", "anneal-1e3", SURROGATE),
-        description="what is compared with the reference: accuracies; surrogate; or the standard run in "
+        description="methods compared with the reference: accuracies; surrogate; or the standard run with "
         "another model or raster, such as '3 layers', 'shells 1 2 4', '64 pixels'",
     )
     cases: dict[Name, Case] = Field(
@@ -101,13 +101,13 @@ class Tradeoff(Block):
 
     @property
     def rasters(self) -> list[int]:
-        """Sides of other rasters that are compared."""
+        """Sides of the other rasters compared."""
         variants = map(variant_named, self.methods)
         return [found.pixels for found in variants if found is not None and found.pixels is not None]
 
     @property
     def annealed(self) -> tuple[str, str] | None:
-        """The case and the method that fold a tissue through itself: the largest delta, the last anneal."""
+        """The case and method that show folding: the largest delta, the last anneal."""
         anneals = [method for method in self.methods if method.startswith("anneal")]
         if not anneals or not self.cases:
             return None
@@ -116,7 +116,7 @@ class Tradeoff(Block):
 
 @dataclass(frozen=True)
 class Reference:
-    """Several reference runs of one mould, of different seeds, and what they agree on.
+    """Reference runs of one mould with different seeds.
 
     Parameters
     ----------
@@ -131,10 +131,9 @@ class Reference:
 
     @property
     def spread(self) -> NDArray[np.float64]:
-        """Seed-to-seed spread of each field (8,): what no prediction of a single run can beat.
+        """Seed-to-seed spread of each field (8,), the error of the best prediction of a single run.
 
-        Root mean square over pixels of the difference of two runs, over sqrt 2, averaged over
-        pairs.
+        Root mean square over pixels of the difference of two runs, over sqrt 2, averaged over pairs.
         """
         pairs = [_distance(a, b) for a, b in combinations(self.stacks, 2)]
         return np.asarray(np.mean(pairs, axis=0) / np.sqrt(2))
@@ -142,21 +141,21 @@ class Reference:
     def field_error(self, fields: NDArray[np.floating], own: int | None = None) -> NDArray[np.float64]:
         """Distance of fields (8, y, x) to single other runs, in units of the spread (8,).
 
-        The mean of very many runs, the best of predictions, scores 1; another run scores sqrt 2.
-        `own` is the number of the reference run that the fields are of.
+        The mean of many runs, the best prediction, scores 1; another run scores sqrt 2. `own` is the
+        number of the reference run to which the fields belong, if any.
         """
         others = [stack for number, stack in enumerate(self.stacks) if number != own]
         return np.asarray(np.mean([_distance(fields, s) for s in others], axis=0) / self.spread)
 
     def shape_error(self, shape: NDArray[np.float64], own: int | None = None) -> NDArray[np.float64]:
-        """A/A0 and w/w0 above the mean of other reference runs, (2,)."""
+        """Differences of A/A0 and w/w0 from the mean of other reference runs, (2,)."""
         others = [found for number, found in enumerate(self.shapes) if number != own]
         return np.asarray(shape - np.mean(others, axis=0))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A case as it is run."""
+    """A case, ready to run."""
 
     name: str
     mould: Mould
@@ -167,7 +166,7 @@ class Trial:
 
     @classmethod
     def of(cls, content: dict[str, Any], mould: Mould) -> "Trial":
-        """The trial that a configuration's `trial` states."""
+        """The trial of a configuration's `trial`."""
         return cls(
             content["name"],
             mould,
@@ -178,7 +177,7 @@ class Trial:
         )
 
     def simulate(self, accuracy: str, seed: int | None = None) -> Tissue:
-        """One run at an accuracy, of the case's seed or another."""
+        """One run at an accuracy, with the case's seed or another."""
         seed = self.seed if seed is None else seed
         return simulate(self.mould, self.parameters, self.model, accuracy, seed)
 
@@ -197,11 +196,11 @@ def compare(
     surrogate: "Surrogate | None" = None,
     on_progress: Callable[[str], None] = lambda what: None,
 ) -> pd.DataFrame:
-    """One row a method: cost, energy, and the errors of fields and shapes against reference runs.
+    """One row per method: cost, energy, and errors of fields and shapes against reference runs.
 
-    `energy_above_best` is the part by which the energy of bonds, walls and contacts lies above the least
-    of any run of the same network without inverted bonds. `core_seconds` are processor time of the
-    run, kernels being compiled and loaded before.
+    `energy_above_best` is the relative excess of the energy of bonds, walls and contacts over the lowest of
+    any run of the same network without inverted bonds. `core_seconds` is the processor time of the run, with
+    kernels already compiled and loaded.
     """
     accuracies = [name for name in methods if name != SURROGATE and variant_named(name) is None]
     variants = {name: found for name in methods if (found := variant_named(name)) is not None}
@@ -265,7 +264,7 @@ def _of_variant(trial: Trial, reference: Reference, name: str, variant: Variant)
 
 
 def _resampled(fields: NDArray[np.float64], pixels: int) -> NDArray[np.float64]:
-    """Fields (8, y, x) on another raster; sums over the image stay."""
+    """Fields (8, y, x) on another raster; sums over the image are preserved."""
     before = fields.shape[-1]
     if before < pixels:
         factor = pixels // before
@@ -313,12 +312,12 @@ def _row(
 
 
 def _distance(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Root mean square over pixels of the difference of two stacks, a field (8,)."""
+    """Root mean square over pixels of the difference of two stacks, per field (8,)."""
     return np.asarray(np.sqrt(((a - b) ** 2).mean(axis=(1, 2))))
 
 
 def summarise(table: pd.DataFrame) -> pd.DataFrame:
-    """One row a method, over its cases: geometric mean of costs, medians and extremes of errors."""
+    """One row per method, over its cases: geometric mean of costs, medians and extremes of errors."""
     named = table.assign(method=table["method"].str.replace(r", seed \d+", "", regex=True))
     groups = named.groupby("method", sort=False)
     spreads = {

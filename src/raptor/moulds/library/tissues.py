@@ -1,4 +1,4 @@
-"""Measured tissues, and the moulds that they grew in (paper, "A summary of widths and areas")."""
+"""Measured tissues and their moulds (paper, "A summary of widths and areas")."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -16,21 +16,21 @@ from raptor.parameters import CellParameters
 
 
 class MeasuredTissue(Block):
-    """A tissue and the mould it grew in: measured, or known by its delta alone."""
+    """A tissue and its mould: measured, or known by its delta alone."""
 
     description: str = Field(description="cells, gel and source of the measurement")
-    mould: str = Field(description="name of a mould of the library, or a mould file beside this one")
+    mould: str = Field(description="a library mould by name, or a mould file beside this one")
     area_ratio: float | None = Field(None, gt=0, le=1.5, description="A/A0")
     width_ratio: float | None = Field(None, gt=0, le=1.5, description="w/w0")
     paper: dict[str, float] = Field(default_factory=dict, description="the paper's fit")
 
     def parameters(self, name: str, given: Mapping[str, float] = MappingProxyType({})) -> CellParameters:
-        """The paper's fitted parameters of the tissue called `name`, those `given` instead of its own.
+        """The paper's fitted parameters of the tissue called `name`, overridden by those `given`.
 
         Raises
         ------
         RaptorError
-            Where the paper gives no fit of a parameter that is not given, or a value is out of bounds.
+            If a parameter is neither given nor fitted in the paper, or a value is out of bounds.
         """
         values = self.paper | dict(given)
         names = [field.name for field in fields(CellParameters)]
@@ -46,7 +46,7 @@ class MeasuredTissue(Block):
         Raises
         ------
         RaptorError
-            Where the paper gives none of them all.
+            If the paper does not give all of them.
         """
         return self.parameters(self.description)
 
@@ -54,26 +54,26 @@ class MeasuredTissue(Block):
     def _measured(self) -> "MeasuredTissue":
         if not self.measured and "delta" not in self.paper:
             raise ValueError(
-                "neither area_ratio nor width_ratio is given; a fit needs one of them (or, for a tissue to "
-                "be simulated and not fitted, the paper's delta)"
+                "neither area_ratio nor width_ratio is given; a fit needs one of them (or the paper's delta, "
+                "for a tissue to be simulated and not fitted)"
             )
         return self
 
     @property
     def measured(self) -> bool:
-        """Whether there is anything to fit."""
+        """Whether a ratio was measured."""
         return self.area_ratio is not None or self.width_ratio is not None
 
 
 def load_tissues(
     path: str | Path | None = None, names: tuple[str, ...] | None = None
 ) -> dict[str, MeasuredTissue]:
-    """Read tissues, all or those named, of the library or of another file; their moulds are not.
+    """Read tissues, all or those named, from the library or another file, without their moulds.
 
     Raises
     ------
     RaptorError
-        Where the file or a tissue in it cannot be used.
+        If the file or a tissue in it cannot be used.
     """
     path = Path(path or TISSUES)
     content = read_yaml(path)
@@ -86,7 +86,7 @@ def tissue(name: str, path: str | Path | None = None) -> MeasuredTissue:
     Raises
     ------
     RaptorError
-        Where the file or the tissue in it cannot be used.
+        If the file or the tissue in it cannot be used.
     """
     return load_tissues(path, (name,))[name]
 

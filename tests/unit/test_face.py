@@ -194,7 +194,10 @@ def test_a_fit_takes_an_outline_in_l0(mould):
         ({"area_ratio": 0.7, "outline": "a.png"}, "give one kind of measurement"),
         ({"area_ratio": 70}, "lies between 0 and 1.5"),
         ({"area_ratio": 0.7, "by": "eye"}, "allowed are surrogate, simulator"),
-        ({"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)}, "start parameters need a fit by the simulator"),
+        (
+            {"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)},
+            "start parameters need a fit by the simulator",
+        ),
         ({"area_ratio": 0.7, "layers": 3}, "layers is 3, but this surrogate is for 7"),
         ({"area_ratio": 0.7, "surrogate": "nowhere"}, "model.json cannot be read"),
     ],

@@ -17,6 +17,8 @@ from raptor.moulds.cast import CastMould, central_section, thin_parts
 from raptor.moulds.geometry import CLEARANCE, Mould
 
 SAMPLES_PER_PIXEL = 4  # along a section
+ENCLOSING = 0.5  # of the threshold: a single row of cells is less dense than that, and encloses
+GAP = 0.75  # l0, around a thin tether: the mean distance of a wall from the first row of cells
 
 
 def shape_ratios(
@@ -56,22 +58,21 @@ def filled(
 ) -> NDArray[np.floating]:
     """Density (y, x) less the threshold; positive too in thin tethers that tissue encloses.
 
-    With them goes the quarter l0 around in which no cell was cast.
+    With them goes the gap of up to 0.75 l0 between tether and tissue: as wide as cast ones are on average
+    and as blurred as the tether. Towards the outside only the quarter l0 counts in which no cell was cast.
     """
     threshold = cast.threshold if threshold is None else threshold
-    above, free = density - threshold, outside(density, threshold)
+    above, free = density - threshold, outside(density, ENCLOSING * threshold)
+    gap = np.where(outside(density, threshold), CLEARANCE, GAP)
     for depth in cast.thin_tethers:
         if not free[depth >= 0].any():
-            above = np.maximum(above, threshold * (depth + CLEARANCE))
+            above = np.maximum(above, threshold * (depth + gap))
     return above
 
 
-def outside(density: NDArray[np.floating], threshold: float) -> NDArray[np.bool_]:
-    """Pixels (y, x) that tissue does not enclose: pixels without any join them to the image's rim.
-
-    Half the threshold counts here: a single row of cells is less dense than the threshold, and encloses.
-    """
-    marks, _ = label(~np.pad(density > threshold / 2, 1))
+def outside(density: NDArray[np.floating], level: float) -> NDArray[np.bool_]:
+    """Pixels (y, x) that pixels of no more than a level of density join to the image's rim."""
+    marks, _ = label(~np.pad(density > level, 1))
     return np.asarray(marks == marks[0, 0])[1:-1, 1:-1]
 
 
@@ -165,10 +166,13 @@ def outline_ratios(tissue: shapely.Geometry, mould: Mould) -> tuple[float, float
 
 
 def with_thin_tethers(tissue: shapely.Geometry, mould: Mould) -> shapely.Geometry:
-    """The tissue's outline and the thin tethers that it encloses, give or take a quarter l0."""
-    near = shapely.get_parts(tissue.buffer(CLEARANCE))
-    whole = shapely.union_all([shapely.Polygon(part.exterior) for part in near])
-    return shapely.union_all([tissue, *(part for part in thin_parts(mould) if whole.covers(part))])
+    """The tissue's outline and the thin tethers that it encloses, with gaps between, as in `filled`."""
+    whole, near = (
+        shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(shape)])
+        for shape in (tissue, tissue.buffer(CLEARANCE))
+    )
+    held = [part for part in thin_parts(mould) if near.covers(part)]
+    return shapely.union_all([tissue, *held, *(whole.intersection(part.buffer(GAP)) for part in held)])
 
 
 def _depression_width(mould: Mould) -> float:

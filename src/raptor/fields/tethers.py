@@ -5,7 +5,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from raptor.fields.shape import outside
+from raptor.fields.shape import ENCLOSING, outside
 from raptor.moulds.cast import CastMould
 from raptor.moulds.loops import centre_of, winding
 
@@ -58,8 +58,8 @@ def seen_held(
 
     What `held` is of cells, as far as an image shows it. NaN where it encloses none as cast.
     """
-    free = outside(density, cast.threshold if threshold is None else threshold)
-    free_as_cast = outside(cast.density, cast.threshold)
+    free = outside(density, ENCLOSING * (cast.threshold if threshold is None else threshold))
+    free_as_cast = outside(cast.density, ENCLOSING * cast.threshold)
     inside = [depth >= 0 for depth in cast.tether_depths]
     return np.array([np.nan if free_as_cast[mask].any() else float(not free[mask].any()) for mask in inside])
 

@@ -22,7 +22,9 @@ from raptor.dataset.scaling import Scaling, fit_scaling, scale_inputs
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import build_stack, read_samples, read_table
 from raptor.dataset.well import write_well
-from raptor.moulds import Mould, read_moulds
+from raptor.fields.tethers import contact, held
+from raptor.moulds import Mould, moulds_by_id, read_moulds
+from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters
 from raptor.symmetry import FIELDS, Element, apply
 from tests.small import build, design
@@ -109,6 +111,28 @@ def test_negative_density_lost_cells_and_a_broken_trace_are_named(folder):
     faults = " ".join(check(folder / "fields.nc"))
     for what in ("density is negative", "density sums to", "sxsx + sysy + szsz is not density"):
         assert what in faults
+
+
+def test_shards_and_stack_say_which_tethers_are_held(made):
+    moulds, runs = moulds_by_id(made / "moulds.geojson"), read_design(made / "design.csv")
+    table = read_table(made / "fields.nc")
+    lost = dict(zip(table.simulation.tolist(), table.measures["posts_lost"].tolist(), strict=True))
+    for path in (made / "shards").glob("*.nc"):
+        for record in read_shard(path).records:
+            cast = CastMould(moulds[runs[record.simulation].mould], 2, 32)
+            assert record.held == pytest.approx(held(record.positions, cast), nan_ok=True)
+            assert record.contact == pytest.approx(contact(record.positions, cast), abs=0.02)
+            assert lost[record.simulation] == record.posts_lost
+    assert (np.abs(table.measures["alignment"]) < 1).all()
+    assert (table.measures["anisotropy"] > 0).all()
+
+
+def test_wrong_measures_are_named(folder):
+    edit(folder / "fields.nc", "posts_lost", lambda values: values.__iadd__(1))
+    edit(folder / "fields.nc", "alignment", lambda values: values.__imul__(-1))
+    faults = check(folder)
+    assert any("posts_lost is" in fault for fault in faults)
+    assert any("alignment is" in fault for fault in faults)
 
 
 def test_an_example_of_the_test_split_and_a_double_one_are_named(folder):

@@ -17,7 +17,7 @@ from raptor.symmetry import Element
 X, Y = np.meshgrid(pixel_centres(256), pixel_centres(256))
 BOX = shapely.box(-20, -10, 20, 10)
 POSTS = tuple(Circle(x, y, 1.3) for x in (-15, 15) for y in (-6, 6))
-DRAWN = RandomMoulds((1500, 5000), 4, (0, 8), (0.9, 1.5), 5.0, 1.5, {"none": 1.0, "mirrors": 1.0})
+DRAWN = RandomMoulds(cells=(1500, 5000), tethers=(0, 8))
 
 
 def smooth_box(half_x, half_y):
@@ -78,7 +78,7 @@ def test_before_contraction_both_ratios_are_one_in_the_library(name, layers):
 def test_before_contraction_both_ratios_are_one_in_random_moulds(pixels):
     rng = np.random.default_rng(1)
     for _ in range(8):
-        ratios = shape_ratios(*_as_cast(CastMould(DRAWN.draw(rng, "m"), 4, pixels)))
+        ratios = shape_ratios(*_as_cast(CastMould(DRAWN.draw(rng, 4, "m"), 4, pixels)))
         assert ratios[0] == 1
         assert ratios[1] == 1 or np.isnan(ratios[1])
 

@@ -10,5 +10,5 @@ MODEL_VERSION = 3
 3: a cell stands at least l0/4 inside every wall; ratios are over the tissue as cast, thin posts filled.
 """
 
-STACK_FORMAT = 2
+STACK_FORMAT = 3
 """Raised when the layout of field stacks changes; they are then rebuilt from the same shards."""

@@ -52,7 +52,8 @@ accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 ## Cost
 {hours:.3f} {unit} in all; per simulation {median:.2f} s (median), {p95:.2f} s (95th percentile),
 {where}. Not converged: {unconverged} of {simulations}. Inverted bonds: at most {inverted:.1e}
-of a tissue's. Simulations of the design that failed and are missing: {missing}.
+of a tissue's. Tissues that lost a tether: {lost}. Simulations of the design that failed and are
+missing: {missing}.
 
 ## How to evaluate another simulator against it
 Simulate the moulds of `moulds.geojson` at the parameters of `design.csv`, rasterise as above, and compare
@@ -111,6 +112,7 @@ def card(
         unconverged=unconverged,
         missing="; ".join(f"{n} ({reason})" for n, reason in sorted(failures.items())) or "none",
         inverted=inverted,
+        lost=int(np.count_nonzero(table.measures["posts_lost"])),
         references=REFERENCES,
     )
 

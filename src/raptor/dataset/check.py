@@ -23,7 +23,10 @@ from raptor.dataset.result import CELLS
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, campaign_folders, read_shard
 from raptor.dataset.stack import Sample, read_masks, read_samples, read_table, record_fields
+from raptor.fields.directors import alignment, anisotropy
+from raptor.fields.labelled import MEASURES
 from raptor.fields.shape import shape_ratios
+from raptor.fields.tethers import contact, held, posts_lost
 from raptor.frame import pixel_size
 from raptor.moulds.cast import CastMould, cast_sites
 from raptor.moulds.geojson import moulds_by_id, read_features, read_moulds
@@ -33,6 +36,7 @@ from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32
+UNDEFINED = ("area_ratio", "width_ratio", "held", "alignment")  # if there is nothing to measure
 WALL_YIELD = 0.1  # l0; depth to which a soft wall yields
 
 
@@ -239,8 +243,8 @@ def _check_variables(file: Any, name: str, *, images: bool = True) -> Iterator[s
             yield f"{name}: variable {variable.name} lacks long_name or units"
         if variable.dtype is not str and (images or variable.ndim < 3):
             values = variable[:]
-            # A mould without material on its central section has no width ratio.
-            if variable.name != "width_ratio" and not np.isfinite(values).all():
+            # No material on the central section; tethers at the outline; cells too sparse or all upright.
+            if variable.name not in UNDEFINED and not np.isfinite(values).all():
                 yield f"{name}: NaN or infinity in {variable.name}"
 
 
@@ -320,9 +324,15 @@ def _compare(sample: Sample, record: Record, run: Run, mould: Mould, layers: int
     if (cast.depression != sample.depression).any() or (cast.tethers != sample.tethers).any():
         yield f"{where}: its masks do not agree with mould {run.mould}"
     fields = record_fields(record, sample.fields.shape[-1])
-    ratios = shape_ratios(sample.fields[0], cast)
-    if not np.allclose(ratios, (sample.area_ratio, sample.width_ratio), equal_nan=True):
-        yield f"{where}: area and width ratio do not agree with its density"
+    measured = (
+        *shape_ratios(sample.fields[0], cast), posts_lost(held(record.positions, cast)),
+        alignment(sample.fields, cast), anisotropy(sample.fields),
+    )  # fmt: skip
+    for name, value in zip(MEASURES, measured, strict=True):
+        if not np.isclose(value, getattr(sample, name), equal_nan=True):
+            yield f"{where}: {name} is {getattr(sample, name):.6g}, recomputed {value:.6g}"
+    if not np.allclose(contact(record.positions, cast), record.contact, atol=0.05):
+        yield f"{where}: contact does not agree with the positions in the shard"
     for name, stored_field, field in zip(FIELDS, sample.fields, fields, strict=True):
         if np.abs(stored_field - field).max() <= RELATIVE * np.abs(field).max():
             continue

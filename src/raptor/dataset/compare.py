@@ -54,11 +54,14 @@ def _simulations(folder: Path) -> dict[int, dict[str, Any]]:
     found: dict[int, dict[str, Any]] = {}
     for shard in shards:
         with open_file(folder / "shards" / shard) as file:
-            ends = np.cumsum(file["row_size"][:])
-            for row, end in enumerate(ends):
-                cells = slice(end - file["row_size"][row], end)
+            counts = {"cell": file["row_size"][:], "tether": file["tethers"][:]}
+            ends = {name: np.cumsum(count) for name, count in counts.items()}
+            for row in range(len(counts["cell"])):
+                parts: dict[str, Any] = {
+                    name: slice(ends[name][row] - counts[name][row], ends[name][row]) for name in counts
+                }
                 found[int(file["simulation"][row])] = {
-                    name: variable[cells if variable.dimensions == ("cell",) else row]
+                    name: variable[parts.get(variable.dimensions[0], row)]
                     for name, variable in file.variables.items()
                     if name != "wall_time"
                 }

@@ -16,6 +16,8 @@ from raptor.core.errors import RaptorError
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
+from raptor.fields.labelled import TETHER_MEASURES
+from raptor.fields.tethers import posts_lost
 from raptor.parameters import PARAMETERS, CellParameters, NetworkModel
 
 RESULTS = {
@@ -52,6 +54,13 @@ class Record:
     positions: NDArray[np.float64]
     orientation: NDArray[np.float64]
     tension: NDArray[np.float64]
+    held: NDArray[np.float64]
+    contact: NDArray[np.float64]
+
+    @property
+    def posts_lost(self) -> int:
+        """Tethers held in fewer than half of the layers."""
+        return posts_lost(self.held)
 
     @property
     def state(self) -> NDArray[np.float64]:
@@ -128,6 +137,12 @@ def write_simulations(file: netCDF4.Dataset, runs: Sequence[Run], simulations: S
         if values.dtype.kind in "bi":
             values = values.astype(np.int8 if name == "converged" else np.int32)
         variable(file, name, along, values, long_name)
+    tethers = np.array([len(s.held) for s in simulations], dtype=np.int32)
+    file.createDimension("tether", int(tethers.sum()))
+    variable(file, "tethers", along, tethers, "number of tethers").sample_dimension = "tether"
+    for name, long_name in TETHER_MEASURES.items():
+        values = np.concatenate([np.empty(0), *(getattr(s, name) for s in simulations)])
+        variable(file, name, ("tether",), values.astype(np.float32), long_name)
     times = np.array([s.wall_time for s in simulations])
     variable(file, "wall_time", along, times, "wall time of the simulation", "s")
     empty = np.empty((0, len(CELL_VARIABLES)))
@@ -229,11 +244,13 @@ def _read_records(file: netCDF4.Dataset) -> list[Record]:
     sizes = file["row_size"][:]
     if sizes.sum() != len(cells):
         raise IndexError(f"row_size counts {sizes.sum()} cells, the file holds {len(cells)}")
-    values = {name: file[name][:] for name in ("simulation", "seed", *PARAMETERS, *RESULTS, "wall_time")}
+    names = ("simulation", "seed", "tethers", *PARAMETERS, *RESULTS, *TETHER_MEASURES, "wall_time")
+    values = {name: np.ma.filled(file[name][:], np.nan) for name in names}
     records = []
-    ends = np.cumsum(sizes)
+    ends, last = np.cumsum(sizes), np.cumsum(values["tethers"])
     for row, (end, size) in enumerate(zip(ends, sizes, strict=True)):
         block = cells[end - size : end]
+        tethers = slice(last[row] - values["tethers"][row], last[row])
         records.append(
             Record(
                 simulation=int(values["simulation"][row]),
@@ -247,6 +264,7 @@ def _read_records(file: netCDF4.Dataset) -> list[Record]:
                 positions=block[:, 3:6],
                 orientation=block[:, 6:9],
                 tension=block[:, 9],
+                **{name: values[name][tethers].astype(np.float64) for name in TETHER_MEASURES},
             )
         )
     return records

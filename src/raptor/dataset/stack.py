@@ -1,6 +1,6 @@
 """The field stack: every simulation as eight images with its mould, in physical units."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -13,7 +13,8 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
 from raptor.dataset.shards import Record, read_failures, read_shard, write_model
-from raptor.fields.labelled import LONG_NAMES
+from raptor.fields.directors import alignment, anisotropy
+from raptor.fields.labelled import LONG_NAMES, MEASURES
 from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_centres
 from raptor.moulds.cast import CastMould
@@ -39,6 +40,9 @@ class Sample:
     converged: bool
     area_ratio: float
     width_ratio: float
+    posts_lost: int
+    alignment: float
+    anisotropy: float
 
 
 def record_fields(record: Record, pixels: int, device: str = "cpu") -> NDArray[np.float32]:
@@ -110,7 +114,7 @@ def build_stack(
 
 def _sample(record: Record, run: Run, mould: CastMould, fields: NDArray[np.float32]) -> Sample:
     """A simulation as images (8, y, x), with its measures and provenance."""
-    area_ratio, width_ratio = shape_ratios(fields[0], mould)
+    area_ratio, width_ratio = shape_ratios(fields[0], mould).tolist()
     return Sample(
         fields=fields,
         depression=mould.depression.astype(np.uint8),
@@ -124,6 +128,9 @@ def _sample(record: Record, run: Run, mould: CastMould, fields: NDArray[np.float
         converged=record.converged,
         area_ratio=area_ratio,
         width_ratio=width_ratio,
+        posts_lost=record.posts_lost,
+        alignment=alignment(fields, mould),
+        anisotropy=anisotropy(fields),
     )
 
 
@@ -164,8 +171,9 @@ def create_stack(file: netCDF4.Dataset, samples: int, pixels: int) -> Callable[[
         "split": (str, along, "train, validation or test", {}),
         "n_cells": ("i4", along, "number of cells", {}),
         "converged": ("i1", along, "1 if the simulation met its solver's tolerance", {}),
-        "area_ratio": ("f8", along, "A/A0", {}),
-        "width_ratio": ("f8", along, "w/w0; NaN if the central section holds no material", {}),
+        **{
+            name: ("i4" if name == "posts_lost" else "f8", along, text, {}) for name, text in MEASURES.items()
+        },
     }  # fmt: skip
     for name, (kind, dimensions, long_name, options) in columns.items():
         made = file.createVariable(name, cast(Any, kind), dimensions, **options)
@@ -191,8 +199,7 @@ class StackTable:
     layers: int
     seed: NDArray[np.int64]
     converged: NDArray[np.int8]
-    area_ratio: NDArray[np.float64]
-    width_ratio: NDArray[np.float64]
+    measures: Mapping[str, NDArray[Any]]
 
     def rows(self, *splits: str) -> list[int]:
         """Samples of some splits, in order."""
@@ -223,7 +230,9 @@ def read_table(path: Path) -> StackTable:
                 [CellParameters(*(float(v) for v in row)) for row in zip(*columns, strict=True)],
                 file.dimensions["x"].size,
                 int(file.layers),
-                *(file[name][:] for name in ("seed", "converged", "area_ratio", "width_ratio")),
+                file["seed"][:],
+                file["converged"][:],
+                {name: np.ma.filled(file[name][:]) for name in MEASURES},
             )
         except (IndexError, KeyError) as error:
             raise RaptorError(f"{path} is not a field stack: {error}") from error
@@ -244,8 +253,7 @@ def read_samples(path: Path, rows: Iterable[int]) -> Iterable[Sample]:
                 str(file["split"][row]),
                 int(file["n_cells"][row]),
                 bool(file["converged"][row]),
-                float(file["area_ratio"][row]),
-                float(file["width_ratio"][row]),
+                *(file[name][row].item() for name in MEASURES),
             )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from raptor.dataset.netcdf import create, variable
 from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
@@ -24,7 +25,7 @@ from raptor.symmetry import FIELDS
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-MEASURES = (*BULK, "area_ratio", "width_ratio")
+MEASURES = (*BULK, "area_ratio", "width_ratio", "alignment", "anisotropy")
 SHAPES = ("area_ratio", "width_ratio")
 ERRORS = ("vrmse", "masked_vrmse", "nrmse", "pearson")
 REGIONS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
@@ -46,9 +47,11 @@ Predictor = Callable[[Sample, CastMould], Guess]
 
 
 def sample_measures(fields: NDArray[np.floating], cast: CastMould) -> dict[str, float]:
-    """Bulk statistics, A/A0 and w/w0 of fields (8, y, x) of a mould's tissue, keyed by `MEASURES`."""
-    shapes = dict(zip(SHAPES, shape_ratios(fields[0], cast).tolist(), strict=True))
-    return bulk_statistics(fields, cast.n_cells, cast.threshold) | shapes
+    """Bulk statistics and measures of fields (8, y, x) of a mould's tissue, keyed by `MEASURES`."""
+    own = (*shape_ratios(fields[0], cast).tolist(), alignment(fields, cast), anisotropy(fields))
+    return bulk_statistics(fields, cast.n_cells, cast.threshold) | dict(
+        zip(MEASURES[len(BULK) :], own, strict=True)
+    )
 
 
 def predictor_of(surrogate: "Surrogate") -> Predictor:
@@ -113,13 +116,14 @@ def evaluate(
         prediction = guess.values if isinstance(guess, Prediction) else guess
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
         row |= asdict(sample.parameters) | {"n_cells": sample.n_cells, "converged": sample.converged}
-        row |= field_errors(prediction, sample.fields, sample)
+        row |= field_errors(prediction, sample.fields, sample) | {"posts_lost_simulated": sample.posts_lost}
         row["vrmse_density_as_cast"] = float(vrmse(cast.density, sample.fields[0]))
         for source, fields in (("simulated", sample.fields), ("predicted", prediction)):
             measured = sample_measures(fields, cast)
             row |= {f"{name}_{source}": value for name, value in measured.items()}
         if isinstance(guess, Prediction):
             row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.ratios, strict=True)}
+            row["posts_lost_predicted"] = guess.posts_lost
             row |= _coverage(guess, sample, row)
         rows.append(row)
         on_progress(sample.simulation)
@@ -198,6 +202,7 @@ def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[
     return {
         "samples": len(metrics),
         "not_converged": int((~metrics["converged"].astype(bool)).sum()),
+        "losing_posts": int((metrics["posts_lost_simulated"] > 0).sum()),
         "fields": fields,
         "density_vrmse_as_cast": float(metrics["vrmse_density_as_cast"].mean()),
         "tether_error": float(metrics["tether_error"].mean()),

@@ -37,7 +37,7 @@ def ratio_of(parameters: CellParameters) -> float:
 
 
 def tabulate(stack: Path) -> pd.DataFrame:
-    """A/A0 and w/w0 of every simulation of a campaign's stack, one row each, without failed ones.
+    """Measures of every simulation of a campaign's stack, one row each, without failed ones.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def tabulate(stack: Path) -> pd.DataFrame:
     columns |= {name: [getattr(p, name) for p in table.parameters] for name in PARAMETERS}
     columns["ratio"] = [ratio_of(p) for p in table.parameters]
     columns |= {"seed": table.seed, "n_cells": table.n_cells, "converged": table.converged.astype(bool)}
-    return pd.DataFrame(columns | {"area_ratio": table.area_ratio, "width_ratio": table.width_ratio})
+    return pd.DataFrame(columns | dict(table.measures))
 
 
 def predict(

@@ -45,6 +45,12 @@ def words(line):
 
 
 LINES = {page: shown(page) for page in PAGES}
+CONFIGURATIONS = {
+    block.split("\n")[0].removeprefix("name: "): block
+    for page in PAGES
+    for language, block in BLOCK.findall(page.read_text())
+    if language == "yaml" and block.startswith("name: ")
+}
 DRY_RUNS = sorted(
     {
         tuple(word for word in words(line) if word != "--dry-run")
@@ -99,6 +105,8 @@ def run(command, long):
         if len(command) > 1:
             collected = [sys.executable, "-m", *command, "--collect-only", "-q"]
             subprocess.run(collected, check=True, cwd=ROOT, env=ENVIRONMENT)
+    elif (ROOT / command[0]).is_file():
+        assert long and os.access(ROOT / command[0], os.X_OK), shlex.join(command)
     else:
         assert command[0] in ("snakemake", "uv", "python"), f"{shlex.join(command)} is not known to this test"
 
@@ -116,6 +124,9 @@ def test_a_page_s_commands_run(page, desk):
 def test_a_dry_run_finds_its_rules(command, tmp_path):
     for name in ("config", "workflow", "Snakefile"):
         (tmp_path / name).symlink_to(ROOT / name)
+    for name, text in CONFIGURATIONS.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    shutil.copy(ROOT / "tests" / "data" / "moulds" / "dog_bone.geojson", tmp_path / "my_mould.geojson")
     done = subprocess.run(
         [sys.executable, "-m", *command, "--dry-run"],
         cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False,

@@ -202,7 +202,7 @@ rule write_card:
 
 
 rule tabulate_campaign:
-    """Area and width of the tissue of every simulation of a campaign, one row a run."""
+    """Tabulate area and width of every simulation of a campaign."""
     input:
         stack=rules.build_stack.output.stack,
     output:
@@ -242,7 +242,7 @@ rule check_splits:
 for campaign in CAMPAIGNS:
 
     rule:
-        """One campaign, checked, with its table of areas and widths: campaign_NAME makes the one called NAME."""
+        """One campaign, checked, with its table of areas and widths; NAME is that of the campaign."""
         name:
             f"campaign_{campaign}"
         input:

@@ -123,7 +123,7 @@ for tissue in TISSUES:
 
 
 rule plot_tables:
-    """Draw a figure from tables: designs, errors, training, contraction, trade-off, posteriors."""
+    """Draw a figure of the run, with its data; plot_tables from tables, plot_fields from fields."""
     input:
         unpack(lambda wildcards: TABLE_FIGURES[wildcards.figure]["inputs"]),
     output:

@@ -1,0 +1,33 @@
+"""docs/workflow.md and its picture agree with the rules."""
+
+import re
+import runpy
+import subprocess
+import sys
+
+from tests.small import ROOT
+
+REFERENCE = runpy.run_path(str(ROOT / "workflow" / "reference.py"))
+PICTURE = (ROOT / "docs" / "images" / "workflow.svg").read_text()
+
+
+def listed():
+    """Rules as Snakemake lists them, those made for each campaign under one name."""
+    command = [sys.executable, "-m", "snakemake", "--list"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    return {re.sub(r"^campaign_\w+", "campaign_NAME", line.split()[0]) for line in done.stdout.splitlines()}
+
+
+def test_the_page_is_that_of_the_rules():
+    again = "run `workflow/env python workflow/reference.py`"
+    assert (ROOT / "docs" / "workflow.md").read_text() == REFERENCE["page"](), again
+
+
+def test_every_rule_is_on_the_page_and_in_the_picture():
+    rules = listed() - {"all"}
+    page = (ROOT / "docs" / "workflow.md").read_text()
+    assert set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)) == rules
+    targets = {rule for rule in rules if re.search(rf"^\| `{rule}` \|[^|]*\|  \|", page, re.MULTILINE)}
+    shown = set(re.findall(r">(\w+)</text>", PICTURE))
+    assert shown <= rules
+    assert rules - shown - targets <= {"record_configuration", "fit_joint"}  # none in the default run

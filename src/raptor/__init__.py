@@ -12,7 +12,7 @@ simulations predict the same fields in a fraction of a second.
     prediction = raptor.predict(mould, cells)
     raptor.plot(tissue).savefig("tissue.png")
 
-`docs/python.md` shows all of it. Names are those of `__init__.pyi`; each is imported when it is first used.
+See `docs/python.md`. Names are those of `__init__.pyi`; each is imported on first use.
 
 Source of the methods: A. E. Andrews et al., "Rapid prediction of organisation in engineered
 corneal, glial and fibroblast tissues using machine learning and biophysical models" (2025).

@@ -83,7 +83,7 @@ def test_a_mould_by_name_and_a_tissue_by_name():
     ("change", "message"),
     [
         ({"mould": "small_rectangel"}, "did you mean 'small_rectangle'"),
-        ({"mould": 3}, "a mould is of type int; give a raptor.Mould, a name of the library or a file"),
+        ({"mould": 3}, "a mould is of type int; give a raptor.Mould, a library name or a file"),
         ({"cells": raptor.tissue("glial_1")}, "the fit of a tissue: raptor.tissue"),
         ({"layers": 0}, "layers is 0; 1 to 64 are allowed"),
         ({"accuracy": "best"}, "allowed are draft, standard, reference"),
@@ -208,5 +208,5 @@ def test_a_fit_that_cannot_be_made_is_named(arguments, message):
 
 
 def test_fields_without_a_mould_are_named(tissue):
-    with pytest.raises(raptor.RaptorError, match="do not say in which mould"):
+    with pytest.raises(raptor.RaptorError, match="these fields have no mould"):
         mould_of(tissue.fields(32).drop_attrs())

@@ -1,8 +1,8 @@
 """A vector register as a number: `Lanes` of float64 or float32 that kernels add and multiply.
 
-Written as loops over arrays, the compiler must assume that arrays overlap and moves one number at a
-time. A kernel that loads, computes and stores whole lanes says what it means, keeps every sum in
-a register, and reads as the formula does. Without compilation lanes are short NumPy arrays.
+In loops over arrays the compiler must assume that arrays overlap, and processes one number at a time. A
+kernel that loads, computes and stores whole lanes keeps every sum in a register and reads like the formula.
+Without compilation lanes are short NumPy arrays.
 """
 
 import operator
@@ -26,7 +26,7 @@ DOUBLES = REGISTER // 8
 
 
 def lanes(precision: DTypeLike) -> int:
-    """Numbers of a precision that one register holds."""
+    """How many numbers of a precision fit into one register."""
     return REGISTER // np.dtype(precision).itemsize
 
 
@@ -36,12 +36,12 @@ def load(array: NDArray[Any], i: int) -> Any:
 
 
 def load_double(array: NDArray[Any], i: int) -> Any:
-    """The `DOUBLES` numbers from array[i] on, of any precision, as lanes of float64."""
+    """`DOUBLES` numbers from array[i] onwards, of any precision, as lanes of float64."""
     return array[i : i + DOUBLES].astype(np.float64)
 
 
 def doubles(number: float) -> Any:
-    """Lanes of float64 that all hold one number."""
+    """Lanes of float64 that all hold the same number."""
     return np.full(DOUBLES, number)
 
 
@@ -56,7 +56,7 @@ def sqrt(value: Any) -> Any:
 
 
 def muladd(a: Any, b: Any, c: Any) -> Any:
-    """The sum a b + c of numbers, or of lanes with one rounding where the processor can."""
+    """Returns a b + c of numbers, or of lanes, fused if the processor can."""
     return a * b + c
 
 
@@ -76,28 +76,28 @@ def magnitude(value: Any) -> Any:
 
 
 def larger(a: Any, b: Any) -> Any:
-    """The larger of two numbers in each lane; the other one where one is NaN."""
+    """The larger of two numbers in each lane; if one is NaN, the other."""
     return np.fmax(a, b)
 
 
 def largest(value: Any) -> float:
-    """Largest of all lanes, NaN left out, float64."""
+    """Largest of all lanes, ignoring NaN, float64."""
     return float(np.nanmax(value))
 
 
 def where(bits: int, number: float, like: Any) -> Any:
-    """Lanes of a number where the mask `bits` has a one, of zero elsewhere."""
+    """A number in the lanes where the mask `bits` has a one, zero elsewhere."""
     held = (int(bits) >> np.arange(len(like))) & 1
     return (held * number).astype(like.dtype)
 
 
 def positive(value: Any) -> Any:
-    """Each lane, or zero where it is less; NaN stays NaN."""
+    """Each lane, or zero if negative; NaN stays NaN."""
     return np.maximum(value, 0)
 
 
 class _LanesType(types.Type):
-    """Numba's type of one register full of a scalar."""
+    """Numba's type of one register of scalars."""
 
     def __init__(self, scalar) -> None:
         self.scalar = scalar
@@ -113,7 +113,7 @@ class _LanesModel(models.PrimitiveModel):
 
 
 def _spread(context, builder, value, kind, lanes_kind):
-    """A number in every lane; lanes as they are."""
+    """A number broadcast to all lanes; lanes unchanged."""
     if isinstance(kind, _LanesType):
         return value
     vector = context.get_value_type(lanes_kind)
@@ -131,7 +131,7 @@ def _pointer(context, builder, kind, array, index, count):
 
 
 def _called(builder, name, kind, result, arguments):
-    """One of LLVM's functions of lanes."""
+    """One of LLVM's vector functions."""
     function = ir.FunctionType(result, [argument.type for argument in arguments])
     name = f"llvm.{name}.v{kind.count}f{kind.scalar.bitwidth}"
     return builder.call(cgutils.get_or_insert_function(builder.module, function, name), arguments)
@@ -328,7 +328,7 @@ def _compiled_where(bits, number, like):
 
 
 def _give_arithmetic(operation: Callable[..., Any], instruction: str) -> None:
-    """Let an operator take lanes with lanes, and lanes with numbers, which it spreads."""
+    """Let an operator combine lanes with lanes, and with numbers, which are broadcast."""
 
     @intrinsic
     def compute(typing, a, b):

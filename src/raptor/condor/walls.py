@@ -1,9 +1,9 @@
-"""Walls: the mould's outline, its tethers, its floor and the fill height push cells back.
+"""Walls: the mould's outline, its tethers, its floor and the fill height repel cells.
 
-The paper's "large penalty" is a stiff spring: stiffness / 2 * depth^2 for a cell that lies `depth`
-inside a wall. The depth in the plane is tabulated once a mould and read through a quadratic
-B-spline: its gradient is continuous, straight walls are exact, corners are rounded over a few
-tenths of l0, and the cost does not grow with the number of tethers.
+The paper's "large penalty" is a stiff spring, stiffness / 2 * depth^2 for a cell at `depth` inside a wall.
+The depth in the plane is tabulated once per mould and interpolated by a quadratic B-spline: its gradient is
+continuous, straight walls are exact, corners are rounded over a few tenths of l0, and the cost is
+independent of the number of tethers.
 """
 
 from typing import NamedTuple
@@ -15,14 +15,14 @@ from raptor.core.compiled import kernel
 from raptor.moulds.geometry import Mould
 
 SPACING = 0.25  # of the table, l0
-RIM = 2.0  # how far the table reaches beyond the outline, l0
-STIFFNESS = 100.0  # kappa0; a few times the stiffness that all of a cell's bonds have together
+RIM = 2.0  # l0; margin of the table beyond the outline
+STIFFNESS = 100.0  # kappa0; a few times the combined stiffness of a cell's bonds
 
 
 class Walls(NamedTuple):
     """A table of depths (rows in y, columns in x), its origin, and the vertical bounds, l0.
 
-    `near` tells, square by square of the table, whether a wall could be within reach.
+    `near` says for each square of the table whether a wall could be within reach.
     """
 
     depth: NDArray[np.float64]
@@ -38,7 +38,7 @@ NO_WALLS = Walls(np.full((3, 3), -1e6), np.zeros((3, 3), np.uint8), 0.0, 0.0, 1e
 
 
 def build_walls(mould: Mould, height: float, stiffness: float = STIFFNESS) -> Walls:
-    """Tabulate how deep each point of the plane lies in a wall of the mould."""
+    """Tabulate the depth of points of the plane in the walls of a mould."""
     x0, y0, x1, y1 = mould.outline.bounds
     x = np.arange(x0 - RIM, x1 + RIM + 2 * SPACING, SPACING)
     y = np.arange(y0 - RIM, y1 + RIM + 2 * SPACING, SPACING)

@@ -1,4 +1,4 @@
-"""Fields with names: what one tissue looks like, as an xarray Dataset that needs nothing else at hand."""
+"""Named fields of one tissue, as a self-contained xarray Dataset."""
 
 import json
 from collections.abc import Mapping
@@ -32,15 +32,15 @@ MEASURES = {
     "width_ratio": "w/w0: width of the tissue on the central section over its width as cast",
     "posts_lost": "number of tethers that tissue encircles in fewer than half of the layers",
     "alignment": "alignment of cells with the long side of the mould, from -1 (across) to 1",
-    "anisotropy": "local alignment of cells in the plane, whatever the direction, from 0 to 1",
+    "anisotropy": "local alignment of cells in the plane, in any direction, from 0 to 1",
 }
 """Numbers of a tissue."""
 
 TETHER_MEASURES = {
     "held": "share of layers in which tissue encircles the tether",
-    "contact": "share of the rim of the tether that has a cell within 1.5 l0",
+    "contact": "share of the rim of the tether with a cell within 1.5 l0",
 }
-"""Numbers of each tether; `held` is NaN at a tether that touches the outline."""
+"""Numbers of each tether; `held` is NaN for a tether that touches the outline."""
 
 
 def labelled(
@@ -50,7 +50,7 @@ def labelled(
     measures: Mapping[str, Any],
     **attributes: Any,
 ) -> "xr.Dataset":
-    """Fields (8, y, x) as a Dataset of eight variables (y, x), with all that is needed to draw them again.
+    """Fields (8, y, x) as a Dataset of eight variables (y, x), with all that is needed to draw them.
 
     Coordinates are `x` and `y` (pixel centres, l0), the masks `depression` and `tethers` (y, x), the three
     parameters and the measures. The attribute `mould` is the mould as GeoJSON, which `mould_of` reads, and
@@ -68,13 +68,13 @@ def labelled(
     RaptorError
         If the depression covers no pixel.
     """
-    import xarray as xr  # here: what only simulates need not wait for it
+    import xarray as xr  # here, because simulations do without it
 
     plane = ("y", "x")
     axes = {axis: (axis, pixel_centres(cast.pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
     masks = {
-        "depression": (plane, cast.depression, named("whether cells may be there")),
-        "tethers": (plane, cast.tethers, named("whether a tether stands there")),
+        "depression": (plane, cast.depression, named("whether cells may lie here")),
+        "tethers": (plane, cast.tethers, named("whether there is a tether here")),
     }
     numbers = {
         name: (("tether",) * np.ndim(value), value, named((PARAMETERS | MEASURES | TETHER_MEASURES)[name]))
@@ -94,12 +94,12 @@ def labelled(
 
 
 def named(long_name: str, units: str = "1") -> Mapping[str, str]:
-    """Attributes of a variable; "1" is the unit of numbers without dimension (CF conventions)."""
+    """Attributes of a variable; "1" is the unit of dimensionless numbers (CF conventions)."""
     return {"long_name": long_name, "units": units}
 
 
 def mould_of(dataset: "xr.Dataset") -> Mould:
-    """The mould of a Dataset that `labelled` made, or of a file of one.
+    """The mould of a Dataset from `labelled`, or of its file.
 
     Raises
     ------
@@ -109,7 +109,5 @@ def mould_of(dataset: "xr.Dataset") -> Mould:
     try:
         feature = json.loads(dataset.attrs["mould"])
     except (KeyError, TypeError, ValueError) as error:
-        raise RaptorError(
-            "these fields do not say in which mould they lie; give a result of RAPTOR, or its file"
-        ) from error
+        raise RaptorError("these fields have no mould; give a result of RAPTOR, or its file") from error
     return from_feature(feature)

@@ -1,8 +1,8 @@
-"""Area and width of a tissue (paper, "Model parameters and predictive capability"), from its density.
+"""Area and width of a tissue from its density (paper, "Model parameters and predictive capability").
 
-Both are taken over the same tissue as cast, at the same threshold, so that they are 1 before contraction in
-every mould. A thin tether that tissue encloses counts as tissue in both. Over the mould, as the paper words
-it, they would depend on where walls fall between rows of the lattice; `mould_ratios` gives those.
+Both are relative to the same tissue as cast, at the same threshold, so they are 1 before contraction in
+every mould. A thin tether enclosed by tissue counts as tissue in both. Relative to the mould, as in the
+paper's words, they would depend on where walls fall between rows of the lattice; `mould_ratios` gives those.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ from raptor.moulds.cast import CastMould, central_section, thin_parts
 from raptor.moulds.geometry import CLEARANCE, Mould
 
 SAMPLES_PER_PIXEL = 4  # along a section
-ENCLOSING = 0.5  # of the threshold: a single row of cells is less dense than that, and encloses
-GAP = 0.75  # l0, around a thin tether: the mean distance of a wall from the first row of cells
+ENCLOSING = 0.5  # of the threshold; even a single row of cells, below the threshold, encloses a tether
+GAP = 0.75  # l0, around a thin tether: mean distance of a wall from the first row of cells
 
 
 def shape_ratios(
@@ -26,9 +26,9 @@ def shape_ratios(
 ) -> NDArray[np.float64]:
     """A/A0 and w/w0, (2,), of a tissue from its density (y, x) in its mould.
 
-    A/A0 is of areas above the threshold, w/w0 of lengths on the central section, thin tethers filled in both
-    and interpolated between pixels. A/A0 is NaN where cells are too sparse to be seen, w/w0 where the section
-    holds no tissue, as cast or as contracted.
+    A/A0 is the ratio of areas above the threshold, w/w0 that of lengths on the central section, both with
+    thin tethers filled and interpolated between pixels. A/A0 is NaN if cells are too sparse to be seen, w/w0
+    if the section holds no tissue, as cast or contracted.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def section_ratio(
     lines: Sequence[shapely.LineString],
     threshold: float | None = None,
 ) -> float:
-    """Length of tissue on sections through the image over that as cast; NaN where either has none."""
+    """Length of tissue on sections through the image over that as cast; NaN if either has none."""
     tissue, before = filled(density, cast, threshold), filled(cast.density, cast)
     return _ratio(_length(tissue, lines), _length(before, lines))
 
@@ -56,10 +56,10 @@ def section_ratio(
 def filled(
     density: NDArray[np.floating], cast: CastMould, threshold: float | None = None
 ) -> NDArray[np.floating]:
-    """Density (y, x) less the threshold; positive too in thin tethers that tissue encloses.
+    """Density (y, x) minus the threshold, made positive in thin tethers enclosed by tissue.
 
-    With them goes the gap of up to 0.75 l0 between tether and tissue: as wide as cast ones are on average
-    and as blurred as the tether. Towards the outside only the quarter l0 counts in which no cell was cast.
+    This includes the gap of up to 0.75 l0 between tether and tissue, which is the mean width at casting and
+    as blurred as the tether. Towards the outside only the quarter l0 counts in which no cell was cast.
     """
     threshold = cast.threshold if threshold is None else threshold
     above, free = density - threshold, outside(density, ENCLOSING * threshold)
@@ -71,16 +71,16 @@ def filled(
 
 
 def outside(density: NDArray[np.floating], level: float) -> NDArray[np.bool_]:
-    """Pixels (y, x) that pixels of no more than a level of density join to the image's rim."""
+    """Pixels (y, x) joined to the image's border by pixels at or below a level of density."""
     marks, _ = label(~np.pad(density > level, 1))
     return np.asarray(marks == marks[0, 0])[1:-1, 1:-1]
 
 
 def area_above(values: NDArray[np.floating]) -> float:
-    """Area, in pixels, over which an image (y, x) of pixel centres is positive, interpolated between them.
+    """Area, in pixels, where an image (y, x) given at pixel centres is positive, by interpolation.
 
-    Each square between four pixel centres is four triangles around its own centre, over which values are
-    linear. Counting pixels would err by half a row along a straight wall.
+    Each square between four pixel centres is split into four triangles, over which values are linear.
+    Counting pixels would err by half a row along a straight wall.
     """
     padded = np.pad(values.astype(np.float64), 1, mode="edge")
     corners = np.stack([padded[:-1, :-1], padded[:-1, 1:], padded[1:, 1:], padded[1:, :-1]])
@@ -89,7 +89,7 @@ def area_above(values: NDArray[np.floating]) -> float:
     mixed = (positive > 0) & (positive < 4)
     around, centre = corners[:, mixed], corners[:, mixed].mean(axis=0)
     share[mixed] = np.mean([_positive_part(around[i], around[i - 1], centre) for i in range(4)], axis=0)
-    share[[0, -1]] /= 2  # half of these squares lies outside of the image
+    share[[0, -1]] /= 2  # half of these squares lies outside the image
     share[:, [0, -1]] /= 2
     return float(share.sum())
 
@@ -97,7 +97,7 @@ def area_above(values: NDArray[np.floating]) -> float:
 def _positive_part(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Share (n,) of triangles over which what is linear between values at the corners is positive."""
+    """Share (n,) of each triangle where the linear interpolant of its corner values is positive."""
     low, middle, high = np.sort(np.stack([a, b, c]), axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         one = high**2 / ((high - middle) * (high - low))
@@ -108,7 +108,7 @@ def _positive_part(
 def _length(above: NDArray[np.floating], lines: Sequence[shapely.LineString]) -> float:
     """Length of sections, l0, where an image (y, x) is positive.
 
-    The ends are found by linear interpolation between samples.
+    The ends follow by linear interpolation between samples.
     """
     return sum(_length_on(above, line) for line in lines)
 
@@ -120,7 +120,7 @@ def _ratio(length: float, before: float) -> float:
 def _length_on(above: NDArray[np.floating], section: shapely.LineString) -> float:
     pixels = above.shape[-1]
     step = pixel_size(pixels) / SAMPLES_PER_PIXEL
-    # The centre is a sample, so that a mould and its mirror image are sampled alike.
+    # The centre is a sample, so that mirror images are sampled alike.
     count = int(section.length / 2 / step)
     along = np.arange(-count, count + 1) * step
     (x0, y0), (x1, y1) = section.coords
@@ -144,9 +144,9 @@ def _length_above(values: NDArray[np.floating]) -> float:
 def mould_ratios(
     density: NDArray[np.floating], cast: CastMould, threshold: float | None = None
 ) -> NDArray[np.float64]:
-    """A/A0 and w/w0, (2,), over the mould, as the paper words them: tethers are no tissue, in neither.
+    """A/A0 and w/w0, (2,), relative to the mould, as in the paper's words; tethers never count as tissue.
 
-    w/w0 is NaN where the central section holds no depression.
+    w/w0 is NaN if the central section holds no depression.
     """
     above = density - (cast.threshold if threshold is None else threshold)
     width = _length(above, [cast.central_section])
@@ -155,10 +155,10 @@ def mould_ratios(
 
 
 def outline_ratios(tissue: shapely.Geometry, mould: Mould) -> tuple[float, float]:
-    """A/A0 and w/w0 of a tissue given by its outline, l0, over the mould as drawn; w/w0 may be NaN.
+    """A/A0 and w/w0 of a tissue given by its outline, l0, relative to the mould as drawn; w/w0 may be NaN.
 
-    As measured on a photograph: a real gel fills its mould, which the lattice does only to within half a
-    spacing. Thin tethers count as tissue where tissue encloses them, as in `shape_ratios`.
+    For photographs: a real gel fills its mould, the lattice only to within half a spacing. Thin tethers
+    enclosed by tissue count as tissue, as in `shape_ratios`.
     """
     seen, gel = with_thin_tethers(tissue, mould), with_thin_tethers(mould.depression, mould)
     widths = [float(central_section(mould).intersection(shape).length) for shape in (seen, gel)]
@@ -166,7 +166,7 @@ def outline_ratios(tissue: shapely.Geometry, mould: Mould) -> tuple[float, float
 
 
 def with_thin_tethers(tissue: shapely.Geometry, mould: Mould) -> shapely.Geometry:
-    """The tissue's outline and the thin tethers that it encloses, with gaps between, as in `filled`."""
+    """The tissue's outline with enclosed thin tethers and the gaps around them, as in `filled`."""
     whole, near = (
         shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(shape)])
         for shape in (tissue, tissue.buffer(CLEARANCE))

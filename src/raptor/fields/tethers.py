@@ -1,4 +1,4 @@
-"""Whether tissue is held by the tethers that it was cast around."""
+"""Attachment of tissue to its tethers."""
 
 import numpy as np
 import shapely
@@ -9,16 +9,16 @@ from raptor.fields.shape import ENCLOSING, outside
 from raptor.moulds.cast import CastMould
 from raptor.moulds.loops import centre_of, winding
 
-CONTACT = 1.5  # l0; tissue this near touches
-RIM_STEP = 0.1  # l0, at most, between points of a rim
+CONTACT = 1.5  # l0; tissue this near is in contact
+RIM_STEP = 0.1  # l0; largest distance between points of a rim
 
 
 def held(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float64]:
     """Share of layers in which the tissue still encircles each tether, (tethers,).
 
-    A layer does where the smallest closed path of sites around the tether as cast still goes around its
-    centre once, either way; layers without such a path are not counted. NaN where none has one, as of a
-    tether that touches the outline.
+    A layer encircles it if the smallest closed path of sites around the tether as cast still has winding
+    number +-1 about its centre; layers without such a path are not counted. NaN if no layer has one, as for
+    a tether that touches the outline.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def held(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float64]
 
 
 def contact(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float64]:
-    """Share of each tether's rim that has a cell within 1.5 l0 in the plane, (tethers,).
+    """Share of each tether's rim with a cell within 1.5 l0 in the plane, (tethers,).
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def contact(positions: NDArray[np.float64], cast: CastMould) -> NDArray[np.float
 
 
 def posts_lost(shares: NDArray[np.float64]) -> int:
-    """How many tethers are held in fewer than half of the layers, of `held` (tethers,)."""
+    """Number of tethers held in fewer than half of the layers, from `held` (tethers,)."""
     return int(np.count_nonzero(shares < 0.5))
 
 
@@ -56,7 +56,7 @@ def seen_held(
 ) -> NDArray[np.float64]:
     """Whether tissue encloses each tether in an image of its density (y, x): 1 or 0, (tethers,).
 
-    What `held` is of cells, as far as an image shows it. NaN where it encloses none as cast.
+    The counterpart of `held` for images. NaN if the tissue as cast does not enclose the tether.
     """
     free = outside(density, ENCLOSING * (cast.threshold if threshold is None else threshold))
     free_as_cast = outside(cast.density, ENCLOSING * cast.threshold)
@@ -65,7 +65,7 @@ def seen_held(
 
 
 def _rim(polygon: shapely.Polygon) -> NDArray[np.float64]:
-    """Points (n, 2) evenly along a tether's rim, l0."""
+    """Points (n, 2) evenly spaced along a tether's rim, l0."""
     rim = polygon.exterior
     places = np.arange(0, rim.length, rim.length / np.ceil(rim.length / RIM_STEP))
     return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(rim, places)))

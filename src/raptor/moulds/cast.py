@@ -1,6 +1,6 @@
-"""A mould cast with a number of layers and seen on an image: what follows from its geometry, solved once.
+"""A mould cast with a number of layers and imaged: what follows from its geometry, computed once.
 
-A prediction, an evaluation, a fit or a check makes one `CastMould` of its mould and hands it on.
+A prediction, an evaluation, a fit or a check makes one `CastMould` and passes it on.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from raptor.moulds.raster import MouldImage, mould_image, tether_depth
 from raptor.raster import density_image, density_threshold
 
 THIN = 4.0  # l0, 5.5 sigma
-HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; the image holds no site beyond
+HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; no site of the image lies beyond
 
 
 @dataclass(frozen=True)
 class CastMould:
-    """A mould, its lattice of so many layers, and both as images; each solved when it is first asked for.
+    """A mould, its lattice and both as images, each computed on first use.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class CastMould:
     layers : int
         Of the lattice.
     pixels : int
-        Along a side of the images.
+        Per side of the images.
     """
 
     mould: Mould
@@ -41,22 +41,22 @@ class CastMould:
 
     @cached_property
     def image(self) -> MouldImage:
-        """Masks (y, x) of depression and tethers; raises a RaptorError where `mould_image` does."""
+        """Masks (y, x) of depression and tethers; raises as `mould_image`."""
         return mould_image(self.mould, self.pixels)
 
     @property
     def depression(self) -> NDArray[np.bool_]:
-        """Pixels (y, x) where cells may be."""
+        """Pixels (y, x) where cells may lie."""
         return self.image.depression
 
     @property
     def tethers(self) -> NDArray[np.bool_]:
-        """Pixels (y, x) where tethers stand."""
+        """Pixels (y, x) of tethers."""
         return self.image.tethers
 
     @cached_property
     def sites(self) -> NDArray[np.float64]:
-        """Sites (cells, 3), l0; raises a RaptorError where `cast_sites` does."""
+        """Sites (cells, 3), l0; raises as `cast_sites`."""
         return cast_sites(self.mould, self.layers)
 
     @property
@@ -82,7 +82,7 @@ class CastMould:
 
     @cached_property
     def thin_tethers(self) -> NDArray[np.float64]:
-        """The same in each part of the tethers that counts as tissue where tissue encloses it (n, y, x)."""
+        """The same for each thin tether, which counts as tissue if enclosed by tissue (n, y, x)."""
         polygons = [tether.polygon for tether in self.mould.tethers]
         depths = [
             self.tether_depths[shapely.intersects(polygons, part)].max(axis=0)
@@ -92,9 +92,9 @@ class CastMould:
 
     @cached_property
     def loops(self) -> list[list[NDArray[np.intp]]]:
-        """Of each tether, and in each layer where there is one, the smallest closed path of sites around it.
+        """The smallest closed path of sites around each tether, in each layer that has one.
 
-        Numbers of sites, of one step each (`smallest_loop`).
+        Indices of sites, one lattice step apart (`smallest_loop`).
         """
         starts = np.searchsorted(self.sites[:, 2], (np.arange(self.layers) + 0.25) / np.sqrt(2))
         planes = [_plane(self.mould, 0.5 * parity) for parity in range(min(self.layers, 2))]
@@ -116,16 +116,16 @@ class CastMould:
         return self.sections((0.0,))[0]
 
     def sections(self, places: Sequence[float]) -> list[shapely.LineString]:
-        """Lines parallel to the central section, at places from -1 to 1 along half of the long side."""
+        """Lines parallel to the central section, at positions from -1 to 1 along half of the long side."""
         centre, half = self.long_axis
         return [_across(centre + place * half, half) for place in places]
 
 
 def thin_parts(mould: Mould) -> list[shapely.Polygon]:
-    """Tethers that count as tissue where tissue encloses them: those narrower than 4 l0.
+    """Tethers narrower than 4 l0, which count as tissue if enclosed by tissue.
 
-    Density is blurred over such a tether, the more the denser the tissue, and who measures a photograph does
-    not cut a thin post out. Tethers that overlap are one. A tether is as wide as the largest circle in it.
+    The density blurs over such a tether, more so in denser tissue, and nobody cuts a thin post out of a
+    measured photograph. Overlapping tethers are one. The width is that of the largest inscribed circle.
     """
     joined = shapely.union_all([tether.polygon for tether in mould.tethers])
     return [part for part in shapely.get_parts(joined) if part.buffer(-0.999 * THIN / 2).is_empty]
@@ -153,7 +153,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
         x0, y0, x1, y1 = mould.outline.bounds
         larger = FITTED / max(x1 - x0, y1 - y0)
         raise RaptorError(
-            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites stand 1 l0 "
+            f"{mould.name} holds no cell: no lattice site lies inside its depression; sites are 1 l0 "
             f"apart, so draw it larger, or give a scale up to {larger:.3g} times as large"
         )
     return sites
@@ -162,7 +162,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
 def central_section(mould: Mould) -> shapely.LineString:
     """The line across the centre of the outline's minimum rotated rectangle, along its short side.
 
-    Where the two sides are equal, the one nearer to x counts as the long one.
+    If the sides are equal, the one nearer to x is the long one.
     """
     return _across(*long_axis(mould))
 
@@ -188,6 +188,6 @@ def _plane(mould: Mould, shift: float) -> NDArray[np.float64]:
 
 
 def _across(middle: NDArray[np.float64], half: NDArray[np.float64]) -> shapely.LineString:
-    """The line through a point across an axis, as long as the image is wide to both sides."""
+    """The line through a point across an axis, extending one image width to both sides."""
     reach = IMAGE_SIZE * np.array([-half[1], half[0]]) / np.hypot(*half)
     return shapely.LineString([middle - reach, middle + reach])

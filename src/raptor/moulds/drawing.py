@@ -1,6 +1,6 @@
-"""A drawing of a mould, before its lengths are in l0: what SVG, DXF, GeoJSON and pictures have in common.
+"""A drawing of a mould in its own units: what SVG, DXF, GeoJSON and pictures have in common.
 
-Closed lines are shapes; open ones count where several of them close a shape together, as in CAD drawings.
+Closed lines are shapes; open lines count if several of them close a shape together, as in CAD drawings.
 """
 
 from collections.abc import Sequence
@@ -28,21 +28,21 @@ from raptor.moulds.geometry import (
     require_standing,
 )
 
-SMALLEST = 0.5  # l0; the longest side of an outline below which no cell can lie inside
-ROW = 0.5  # l0; rows of sites of all layers, along x and along y
-LARGEST_BLUR = 0.125  # l0; a wall is never moved further than this
-DIGITS = 4  # of a coordinate in l0, after the point: drawing programs and renderers round below that
-ROUND = 1e-3  # of its radius: how far a round shape may leave a circle
-SAME = 1e-3  # of its area: a shape that differs less from another is drawn twice
-GAP, WIDE_GAP = 2e-4, 0.02  # of the drawing's longest side: ends that meet; ends that were meant to
-PAGE = 0.98  # of the page, along both sides, that a background covers
+SMALLEST = 0.5  # l0; an outline whose longest side is shorter holds no cell
+ROW = 0.5  # l0; spacing of the rows of sites of all layers, along x and along y
+LARGEST_BLUR = 0.125  # l0; no wall is moved farther than this
+DIGITS = 4  # decimals of a coordinate in l0; drawing programs and renderers round below that
+ROUND = 1e-3  # of its radius: tolerance for a circle
+SAME = 1e-3  # of its area: shapes that differ less are duplicates
+GAP, WIDE_GAP = 2e-4, 0.02  # of the drawing's longest side: ends that meet; ends meant to meet
+PAGE = 0.98  # share of the page's sides covered by a background
 ROLES = {"outline": ("outline", "depression"), "tether": ("tether", "post")}
-FARTHEST = 1e9  # drawing units; a coordinate beyond it is a mistake
+FARTHEST = 1e9  # drawing units; larger coordinates are mistakes
 
 
 @dataclass(frozen=True)
 class Page:
-    """The sheet that a drawing stands on: lower left corner and sides, drawing units, y up."""
+    """The page of a drawing: lower left corner and sides, drawing units, y up."""
 
     x: float
     y: float
@@ -51,7 +51,7 @@ class Page:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Its middle."""
+        """Its centre."""
         return self.x + self.width / 2, self.y + self.height / 2
 
     @property
@@ -75,12 +75,12 @@ class Shape:
 
     @property
     def size(self) -> float:
-        """Area of its convex hull: a shape that crosses itself has one, too."""
+        """Area of its convex hull, which a shape that crosses itself has too."""
         return float(self.polygon.convex_hull.area)
 
     @cached_property
     def tether(self) -> Tether:
-        """The shape as a tether, round where it is drawn round."""
+        """The shape as a tether; drawn circles stay circles."""
         return circle_of(self.polygon) or PolygonTether(self.polygon)
 
 
@@ -99,21 +99,11 @@ class Drawing:
 
     Parameters
     ----------
-    shapes : tuple of Shape
-    lines : tuple of Line
-    page : Page or None
-        None where the file does not say how large its page is.
-    unit : str
-        What messages call a drawing unit.
-    mm : float or None
-        Millimetres per unit, where the file has a real unit.
-    l0 : float or None
-        l0 per unit, where the file says so.
-    framed : bool
-        Whether the page, a square, is drawn as the frame.
-    blur : float
-        How finely the drawing tells where a wall is, drawing units. A corner nearer than this to a row of
-        sites is put on it, so that noise does not decide about a whole row.
+    shapes : tuple of Shape lines : tuple of Line page : Page or None None if the file does not give the size
+    of its page. unit : str Name of a drawing unit in messages. mm : float or None Millimetres per unit, if
+    the file has a real unit. l0 : float or None l0 per unit, if the file states it. framed : bool Whether
+    the page is the frame. blur : float Precision of walls, drawing units. A corner nearer than this to a row
+    of sites is moved onto it, so that noise does not decide about a whole row.
     """
 
     shapes: tuple[Shape, ...]
@@ -128,21 +118,21 @@ class Drawing:
     def mould(self, path: Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
         """The mould drawn in the file `path`, lengths in l0.
 
-        The middle of the outline's bounding box is the origin. Without a scale (l0 per drawing unit, or
-        millimetres per l0) the page is the frame if it is drawn as that; if not, the outline's longest side
-        becomes 52 l0.
+        The centre of the outline's bounding box is the origin. Without a scale (l0 per drawing unit, or
+        millimetres per l0) the page is the frame if so drawn; otherwise the outline's longest side becomes
+        52 l0.
 
         Raises
         ------
-        RaptorError
-            If no outline is drawn or several, or the mould cannot be cast; a scale that fits is named.
+        RaptorError If there is no outline or several, or the mould cannot be cast; the message names a scale
+        that fits.
         """
         try:
             outline, tethers = _told_apart(self._closed(), self.page)
             placement = self._placement(outline, scale, mm_per_l0)
             blur = min(self.blur * placement.scale, LARGEST_BLUR)
             walls = _placed(PolygonTether(outline.polygon), placement, blur).polygon
-            bare = Mould(walls, name=path.stem)  # so that tethers are held against a valid outline
+            bare = Mould(walls, name=path.stem)  # raises for an invalid outline first
             standing = tuple(_placed(shape.tether, placement, blur) for shape in tethers)
             for shape, tether in zip(tethers, standing, strict=True):
                 _require_wide(tether, shape.name, placement, walls)
@@ -154,26 +144,26 @@ class Drawing:
             raise RaptorError(f"mould file {path}: {error}") from error
 
     def _closed(self) -> list[Shape]:
-        """The shapes, and those that open lines close together; each once."""
+        """The shapes, with those closed by open lines, without duplicates."""
         corners = [shapely.get_coordinates(shape.polygon) for shape in self.shapes]
         corners += [line.corners for line in self.lines]
         everything = np.concatenate(corners) if corners else np.zeros((0, 2))
         if everything.size and not np.abs(everything).max() < FARTHEST:
-            raise RaptorError(f"a coordinate is beyond {FARTHEST:g}, or is no number; look at its corners")
+            raise RaptorError(f"a coordinate is beyond {FARTHEST:g}, or not a number; check its corners")
         closed = list(self.shapes)
         longest = float(np.ptp(everything, axis=0).max()) if everything.size else 0.0
         if self.lines:
             closed += joined(self.lines, GAP * longest)
             _require_closed(self.lines, closed, longest)
         kept: list[Shape] = []
-        for shape in sorted(closed, key=lambda shape: shape.role == ""):  # of twins, the one with a role
+        for shape in sorted(closed, key=lambda shape: shape.role == ""):  # of duplicates, one with a role
             if not any(_same(shape, other) for other in kept):
                 kept.append(shape)
         chosen = {id(shape) for shape in kept}
         return [shape for shape in closed if id(shape) in chosen]
 
     def _placement(self, outline: Shape, scale: float | None, mm_per_l0: float | None) -> "Placement":
-        """Where the origin lies, and how long a drawing unit is."""
+        """The position of the origin, and the length of a drawing unit."""
         x0, y0, x1, y1 = outline.polygon.bounds
         width, height = x1 - x0, y1 - y0
         longest, middle = max(width, height), ((x0 + x1) / 2, (y0 + y1) / 2)
@@ -223,13 +213,13 @@ class Placement:
     fitted: bool
 
     def note(self, unit: str) -> str:
-        """How the drawing was scaled, for people."""
+        """Description of how the drawing was scaled."""
         said = f"{self.scale:.4g} l0 per {unit}"
         return f"fitted to the frame at {said} (overrule by --scale)" if self.fitted else said
 
 
 def role_of(*words: str) -> str:
-    """What a name calls a shape: "outline", "tether" or ""."""
+    """The role in a name: "outline", "tether" or ""."""
     for word in words:
         for role, beginnings in ROLES.items():
             if word.strip().lower().startswith(beginnings):
@@ -238,7 +228,7 @@ def role_of(*words: str) -> str:
 
 
 def circle_of(polygon: shapely.Polygon) -> Circle | None:
-    """The circle that a polygon of many corners draws, if it is one."""
+    """The circle drawn by a polygon of many corners, if any."""
     corners = shapely.get_coordinates(polygon.exterior)
     if len(corners) < 16 or polygon.interiors or not polygon.is_valid:
         return None
@@ -253,7 +243,7 @@ def circle_of(polygon: shapely.Polygon) -> Circle | None:
 
 
 def joined(lines: Sequence[Line], gap: float) -> list[Shape]:
-    """The shapes that open lines close where their ends lie within `gap` of each other."""
+    """The shapes closed by open lines whose ends lie within `gap` of each other."""
     ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
     knots = _knots(ends, gap)
     met: dict[bytes, tuple[Line, shapely.LineString]] = {}
@@ -262,7 +252,7 @@ def joined(lines: Sequence[Line], gap: float) -> list[Shape]:
         corners[0], corners[-1] = knots[2 * number], knots[2 * number + 1]
         path = shapely.LineString(corners)
         if path.length > 0:
-            met.setdefault(path.normalize().wkb, (line, path))  # a line drawn twice counts once
+            met.setdefault(path.normalize().wkb, (line, path))  # duplicates count once
     shapes = []
     for polygon in shapely.get_parts(shapely.polygonize([path for _, path in met.values()])):
         rim = polygon.exterior.buffer(1e-6 * polygon.length)
@@ -273,7 +263,7 @@ def joined(lines: Sequence[Line], gap: float) -> list[Shape]:
 
 
 def _knots(ends: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
-    """Ends of lines (n, 2), each moved to the middle of those within `gap` of it."""
+    """Ends of lines (n, 2), each moved to the mean of those within `gap` of it."""
     pairs = KDTree(ends).query_pairs(gap, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends),) * 2)
     _, knot = connected_components(links, directed=False)
@@ -282,19 +272,19 @@ def _knots(ends: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
 
 
 def rounded(value: float, up: bool = False) -> str:
-    """A positive number to three digits, never above it, or with `up` never below."""
+    """A positive number rounded down to three digits, or up with `up`."""
     step = 10.0 ** (floor(log10(value)) - 2)
     return f"{(ceil if up else floor)(value / step * (1 + (-1e-9 if up else 1e-9))) * step:.3g}"
 
 
 def _told_apart(shapes: list[Shape], page: Page | None) -> tuple[Shape, list[Shape]]:
-    """The outline, and the tethers, which all other shapes are."""
+    """The outline, and all other shapes as tethers."""
     outlines = [shape for shape in shapes if shape.role == "outline"]
     if len(outlines) > 1:
         names = ", ".join(shape.name for shape in outlines)
         raise RaptorError(
             f"{len(outlines)} shapes are called outline ({names}); a mould is one connected outline, so keep "
-            "one and call what stands in it tether"
+            "one and name the shapes in it tether"
         )
     candidates = outlines or [shape for shape in shapes if shape.role != "tether"]
     if not candidates:
@@ -315,12 +305,12 @@ def _covers_page(shape: Shape, page: Page | None) -> bool:
 
 
 def _is_background(shape: Shape, outline: Shape, page: Page | None) -> bool:
-    """Whether a shape without a role is the sheet that the outline lies on."""
+    """Whether a shape without a role is the background of the outline."""
     return not shape.role and _covers_page(shape, page) and bool(shape.polygon.covers(outline.polygon))
 
 
 def _require_no_background(outline: Shape, others: list[Shape], page: Page | None) -> None:
-    """Raise a RaptorError where the outline seems to be the sheet that the mould is drawn on."""
+    """Raise a RaptorError if the outline seems to be the background of the mould."""
     if not others or not _covers_page(outline, page):
         return
     second = max(others, key=lambda shape: shape.size)
@@ -333,7 +323,7 @@ def _require_no_background(outline: Shape, others: list[Shape], page: Page | Non
 
 
 def _same(shape: Shape, other: Shape) -> bool:
-    """Whether two shapes are one, drawn twice."""
+    """Whether two shapes are duplicates."""
     first, second = shape.polygon, other.polygon
     near = np.abs(np.subtract(first.bounds, second.bounds)).max() <= SAME * np.sqrt(shape.size)
     if not near or not (first.is_valid and second.is_valid):
@@ -342,7 +332,7 @@ def _same(shape: Shape, other: Shape) -> bool:
 
 
 def _placed(shape: Tether, placement: Placement, blur: float) -> Tether:
-    """A shape in l0, to as many digits as count."""
+    """A shape in l0, rounded to the significant digits."""
     moved = _on_rows(shape.shifted(-placement.x, -placement.y).scaled(placement.scale), blur)
     if isinstance(moved, Circle):
         return Circle(*(round(value, DIGITS) for value in (moved.x, moved.y, moved.radius)))
@@ -350,9 +340,9 @@ def _placed(shape: Tether, placement: Placement, blur: float) -> Tether:
 
 
 def _require_wide(tether: Tether, name: str, placement: Placement, outline: shapely.Polygon) -> None:
-    """Raise a RaptorError for a tether that is too thin, with the scale at which it is not."""
+    """Raise a RaptorError for a tether that is too thin, naming a scale at which it is not."""
     if not tether.polygon.is_valid or tether.polygon.is_empty:
-        return  # told elsewhere
+        return  # reported elsewhere
     half = float(shapely.maximum_inscribed_circle(tether.polygon).length)
     if half >= 0.999 * SMALLEST_TETHER or half == 0:
         return
@@ -368,7 +358,7 @@ def _require_wide(tether: Tether, name: str, placement: Placement, outline: shap
 
 
 def _require_closed(lines: Sequence[Line], closed: Sequence[Shape], longest: float) -> None:
-    """Raise a RaptorError if lines nearly close an outline, or one of that name stays open."""
+    """Raise a RaptorError if lines nearly close an outline, or one of that name is open."""
     if any(shape.role == "outline" for shape in closed):
         return
     nearly = [
@@ -384,7 +374,7 @@ def _require_closed(lines: Sequence[Line], closed: Sequence[Shape], longest: flo
 
 
 def _gap(lines: Sequence[Line], longest: float) -> str | None:
-    """The widest gap between two ends that were meant to meet, for messages."""
+    """The widest gap between two ends meant to meet, for messages."""
     ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
     tree = KDTree(ends)
     meet = {int(end) for pair in tree.query_pairs(GAP * longest) for end in pair}
@@ -408,6 +398,6 @@ def _on_rows(shape: Tether, blur: float) -> Tether:
         rows = np.rint(corners / ROW) * ROW
         return np.where(np.abs(corners - rows) <= blur, rows, corners)
 
-    # Corners that the picture had cut off meet again.
+    # Bevelled corners of the picture become corners again.
     moved = shapely.transform(shape.polygon, snapped).simplify(0.0)
     return PolygonTether(moved) if moved.is_valid and moved.area > 0 else shape

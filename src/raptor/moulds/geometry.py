@@ -15,11 +15,11 @@ from shapely.validation import explain_validity
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
 
-FITTED = 52.0  # l0; the longest side of a drawing that does not say its scale: the library's median
+FITTED = 52.0  # l0; longest side of a drawing without a scale: the library's median
 SMALLEST_TETHER = 0.4  # l0; the half width at which no step or trial move can cross a wall
-CLEARANCE = 0.248  # l0; a cell stands at least a quarter inside every wall, give or take a drawing's rounding
-STRICTLY = 1e-9  # l0; a pixel's centre this close to a wall lies on it
-TOUCHING = 1e-3  # l0; how far a tether may reach out of the outline
+CLEARANCE = 0.248  # l0; least distance of cells from walls: a quarter, less the rounding of drawings
+STRICTLY = 1e-9  # l0; a pixel centre this close to a wall lies on it
+TOUCHING = 1e-3  # l0; tolerance for tethers that reach out of the outline
 TOO_THIN = f"is too thin to hold cells back; make it at least {2 * SMALLEST_TETHER} l0 across"
 CIRCLE_SEGMENTS = 64  # a quarter circle, where a circle must be drawn as a polygon
 
@@ -43,14 +43,14 @@ class Circle:
         return pi * self.radius**2
 
     def validate(self, what: str) -> None:
-        """Raise a RaptorError, which calls the post `what`, unless it holds cells back."""
+        """Raise a RaptorError that names the post as `what`, unless it holds cells back."""
         if not self.radius > 0:
             raise RaptorError(f"{what} has radius {self.radius}; it must be positive")
         if self.radius < 0.999 * SMALLEST_TETHER:
             raise RaptorError(f"{what} {TOO_THIN}")
 
     def stands_in(self, outline: shapely.Polygon) -> bool:
-        """Whether it lies in the outline, touching allowed."""
+        """Whether it lies in the outline; touching is allowed."""
         centre = shapely.Point(self.x, self.y)
         reach: float = outline.exterior.distance(centre)
         return bool(outline.contains(centre) and reach >= self.radius - TOUCHING)
@@ -73,13 +73,13 @@ class Circle:
         return replace(self, x=self.x + x, y=self.y + y)
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in a mould file."""
+        """As stored in a mould file."""
         return {"x": self.x, "y": self.y, "radius": self.radius}
 
 
 @dataclass(frozen=True)
 class PolygonTether:
-    """A tether of any simple outline, such as a bar."""
+    """A tether with any simple outline, such as a bar."""
 
     polygon: shapely.Polygon
 
@@ -89,13 +89,13 @@ class PolygonTether:
         return float(self.polygon.area)
 
     def validate(self, what: str) -> None:
-        """Raise a RaptorError, which calls the tether `what`, unless it is simple and holds cells back."""
+        """Raise a RaptorError that names the tether as `what`, unless it is simple and holds cells back."""
         _validate_polygon(self.polygon, what)
         if self.polygon.buffer(-0.999 * SMALLEST_TETHER).is_empty:
             raise RaptorError(f"{what} {TOO_THIN}")
 
     def stands_in(self, outline: shapely.Polygon) -> bool:
-        """Whether it lies in the outline, touching allowed."""
+        """Whether it lies in the outline; touching is allowed."""
         return bool(outline.covers(self.polygon.buffer(-TOUCHING)))
 
     def depth(self, points: NDArray[np.float64], marks: Any = None) -> NDArray[np.float64]:
@@ -115,7 +115,7 @@ class PolygonTether:
         return PolygonTether(translate(self.polygon, x, y))
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in a mould file."""
+        """As stored in a mould file."""
         return {"polygon": _ring(self.polygon)}
 
 
@@ -129,19 +129,19 @@ class Mould:
     Parameters
     ----------
     outline : shapely.Polygon
-        The depression. Its holes, if it has any, become tethers.
+        The depression. Its holes, if any, become tethers.
     tethers : sequence of Circle, PolygonTether or shapely.Polygon
-        What stands in it and holds no cells; kept as a tuple of Circle and PolygonTether.
+        Obstacles without cells; stored as a tuple of Circle and PolygonTether.
     symmetry : str
-        The class that the generator drew from, a key of `random_moulds.GROUPS`, or "unknown".
+        The class drawn by the generator, a key of `random_moulds.GROUPS`, or "unknown".
     name : str
         Mould id or file name, for messages.
     mm_per_l0 : float or None
-        Millimetres per l0, where the mould was drawn in a real unit.
+        Millimetres per l0, if the mould was drawn in a real unit.
     family : str
-        The family of outlines that it was drawn from (`families`), if any.
+        Its family of outlines (`families`), if any.
     note : str
-        How a drawing was scaled, for people.
+        Description of how a drawing was scaled.
 
     Raises
     ------
@@ -179,13 +179,13 @@ class Mould:
         solid = shapely.Polygon(outline.exterior) if outline.interiors else outline
         holes = map(shapely.Polygon, outline.interiors)
         standing = tuple(_tether(each, name) for each in (*tethers, *holes))
-        # The values of a frozen dataclass cannot be set by name.
+        # Attributes of a frozen dataclass cannot be assigned directly.
         vars(self).update(outline=solid, tethers=standing, symmetry=symmetry, name=name)
         vars(self).update(mm_per_l0=mm_per_l0, note=note, family=family)
         self.validate()
 
     def validate(self) -> None:
-        """Raise a RaptorError that names what is wrong with the mould, if anything is."""
+        """Raise a RaptorError that names a fault of the mould, if there is one."""
         _validate_polygon(self.outline, f"{self.name}: the outline")
         half = IMAGE_SIZE / 2
         if max(map(abs, self.outline.bounds)) > half:
@@ -195,13 +195,13 @@ class Mould:
             )
         for number, tether in enumerate(self.tethers, start=1):
             require_standing(tether, self.outline, f"{self.name}: tether {number}")
-        # Most moulds have room left whatever their tethers overlap; the union is expensive.
+        # The union of tethers is expensive, and most moulds have room even without overlaps.
         room = self.outline.area - sum(tether.area for tether in self.tethers)
         if room < 1e-6 and self.depression.area < 1e-6:
             raise RaptorError(f"{self.name}: the tethers cover the depression; nothing is left to cast")
 
     def in_millimetres(self, layers: int | None = None) -> str:
-        """What it measures in millimetres, and how deep so many layers are; "" if it has no real unit."""
+        """Its size in millimetres and the depth of the layers; "" if it has no real unit."""
         if self.mm_per_l0 is None:
             return ""
         x0, y0, x1, y1 = (value * self.mm_per_l0 for value in self.outline.bounds)
@@ -210,17 +210,17 @@ class Mould:
 
     @cached_property
     def depression(self) -> shapely.Geometry:
-        """The region that holds cells: the outline less the tethers."""
+        """The region that holds cells: the outline minus the tethers."""
         if not self.tethers:
             return self.outline
         return self.outline.difference(shapely.union_all([t.polygon for t in self.tethers]))
 
     def forbidden_depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 2) lie in a tether or outside the outline, (n,), l0.
+        """Depth of points (n, 2) in a tether or outside the outline, (n,), l0.
 
-        Negative where a cell may be: minus the distance to the nearest wall.
+        Negative where a cell may lie: minus the distance to the nearest wall.
         """
-        marks = shapely.points(points)  # made once; it costs more than the distances
+        marks = shapely.points(points)  # made once, because it costs more than the distances
         depth = -signed_depth(self.outline, points, marks)
         for tether in self.tethers:
             np.maximum(depth, tether.depth(points, marks), out=depth)
@@ -255,7 +255,7 @@ class Mould:
 
 
 def _tether(shape: Any, name: str) -> Tether:
-    """A tether as a mould keeps it."""
+    """A tether in the form stored in a mould."""
     if isinstance(shape, shapely.Polygon):
         return PolygonTether(shape)
     if not isinstance(shape, Tether):
@@ -266,12 +266,12 @@ def _tether(shape: Any, name: str) -> Tether:
 
 
 def depth(layers: int) -> float:
-    """Fill height of so many layers, l0."""
+    """Fill height of a number of layers, l0."""
     return float(layers / np.sqrt(2))
 
 
 def require_standing(tether: Tether, outline: shapely.Polygon, what: str) -> None:
-    """Raise a RaptorError, which calls the tether `what`, unless it holds cells back in a valid outline."""
+    """Raise a RaptorError that names the tether as `what`, unless it fits a valid outline."""
     tether.validate(what)
     if not tether.stands_in(outline):
         raise RaptorError(f"{what} reaches out of the depression; move it inside the outline")
@@ -282,7 +282,7 @@ def signed_depth(
 ) -> NDArray[np.float64]:
     """Distance of points (n, 2) to a polygon's boundary, (n,), positive inside, l0.
 
-    `marks` are the points as shapely's, where they have been made before.
+    `marks` are the points as shapely objects, if already made.
     """
     shapely.prepare(polygon)
     inside = shapely.contains_xy(polygon, points[:, 0], points[:, 1])

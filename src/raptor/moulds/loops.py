@@ -1,4 +1,4 @@
-"""Closed paths of sites around a tether as cast: what holds the tissue on it."""
+"""Closed paths of sites around a tether as cast, which hold the tissue on it."""
 
 import numpy as np
 import shapely
@@ -8,11 +8,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from raptor.moulds.geometry import Tether
 
-NEARER = 1e-6  # of a step, for each l0^2 from the centre: of the smallest paths that of the nearest sites
+NEARER = 1e-6  # of a step, per l0^2 from the centre: among equal paths, prefer that of the nearest sites
 
 
 def centre_of(tether: Tether) -> NDArray[np.float64]:
-    """The centre (2,) of a tether, l0: its centroid, or where that lies outside a point well inside."""
+    """The centre (2,) of a tether, l0: its centroid, or a point well inside if that lies outside."""
     polygon = tether.polygon
     centre = polygon.centroid if polygon.contains(polygon.centroid) else shapely.point_on_surface(polygon)
     return np.array([centre.x, centre.y])
@@ -21,14 +21,14 @@ def centre_of(tether: Tether) -> NDArray[np.float64]:
 def smallest_loop(plane: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.intp] | None:
     """The smallest closed path, one lattice step each, through sites (n, 2) of a layer around a point.
 
-    Every site is doubled: a step across the ray from the point along x leads from one copy to the other. A
-    path from a site to its own copy goes around the point an odd number of times, the shortest of all
+    Every site is doubled, and a step across the ray from the point along x leads from one copy to the other.
+    A path from a site to its own copy winds around the point an odd number of times, and the shortest one
     once.
 
     Returns
     -------
     ndarray (m,) or None
-        Numbers of sites along the path; None where no path goes around.
+        Indices of sites along the path; None if no path encloses the point.
     """
     count = len(plane)
     first, second, across = _steps(plane, centre)
@@ -65,7 +65,7 @@ def _steps(
 
 
 def _path(before: NDArray[np.int32], start: int, end: int) -> NDArray[np.intp]:
-    """Numbers along the path that ends at a node, found from each node's predecessor; without the start."""
+    """Nodes along the path that ends at a node, from each node's predecessor, without the start."""
     path = [end]
     while before[path[-1]] != start:
         path.append(int(before[path[-1]]))
@@ -73,7 +73,7 @@ def _path(before: NDArray[np.int32], start: int, end: int) -> NDArray[np.intp]:
 
 
 def winding(points: NDArray[np.float64], centre: NDArray[np.float64]) -> int:
-    """How many times a closed path through points (n, 2) goes around a centre, counter-clockwise."""
+    """Winding number of a closed path through points (n, 2) about a centre, counter-clockwise."""
     x, y = (points - centre).T
     next_x, next_y = np.roll(x, -1), np.roll(y, -1)
     turns = np.arctan2(x * next_y - y * next_x, x * next_x + y * next_y)

@@ -1,4 +1,4 @@
-"""Moulds as images: the two mask channels that the surrogate reads."""
+"""Moulds as images: the two mask channels of the surrogate's input."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ from raptor.moulds.geometry import STRICTLY, Mould, Tether, signed_depth
 
 @dataclass(frozen=True)
 class MouldImage:
-    """Masks (y, x), row 0 at the lowest y: where cells may be, and where tethers stand."""
+    """Masks (y, x), row 0 at the lowest y: where cells may lie, and where tethers are."""
 
     depression: NDArray[np.bool_]
     tethers: NDArray[np.bool_]
 
 
 def mould_image(mould: Mould, pixels: int) -> MouldImage:
-    """Masks of a mould: a pixel belongs to what its centre lies in (paper, "Machine Learning").
+    """Masks of a mould: a pixel belongs to the region that contains its centre (paper, "Machine Learning").
 
     Raises
     ------
@@ -58,7 +58,7 @@ def tether_depth(tether: Tether, pixels: int, reach: float) -> NDArray[np.float6
 def _strictly_inside(polygon: shapely.Polygon, pixels: int) -> NDArray[np.bool_]:
     """Pixels (y, x) whose centres lie inside a polygon, not on its boundary.
 
-    Distances are taken of pixels beside the boundary alone.
+    Distances are computed only for pixels beside the boundary.
     """
     centres = pixel_centres(pixels)
     points = np.stack(np.meshgrid(centres, centres), axis=-1)

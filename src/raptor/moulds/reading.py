@@ -1,4 +1,4 @@
-"""One door for moulds: a name of the library, or a file: GeoJSON, SVG, DXF or a picture (docs/moulds.md)."""
+"""Reading of moulds: by library name, or from GeoJSON, SVG, DXF or a picture (docs/moulds.md)."""
 
 from difflib import get_close_matches
 from math import isfinite
@@ -15,7 +15,7 @@ SUFFIXES = (".geojson", ".json", ".svg", ".svgz", ".dxf", *PICTURES)
 
 
 def find_mould(name: str | Path) -> Path:
-    """The file of a mould: the path given, or the library's file where that is the name of one.
+    """The file of a mould: the given path, or that of the library mould of this name.
 
     Raises
     ------
@@ -33,24 +33,24 @@ def find_mould(name: str | Path) -> Path:
 
 
 def as_mould(mould: Mould | str | Path) -> Mould:
-    """A mould as it is, or the one that a name of the library or a file stands for.
+    """A mould itself, or the mould of a library name or file.
 
     Raises
     ------
     RaptorError
-        As `read_mould`, and if it is anything else.
+        As `read_mould`, and for any other type.
     """
     if isinstance(mould, Mould):
         return mould
     if isinstance(mould, (str, Path)):
         return read_mould(mould)
     raise RaptorError(
-        f"a mould is of type {type(mould).__name__}; give a raptor.Mould, a name of the library or a file"
+        f"a mould is of type {type(mould).__name__}; give a raptor.Mould, a library name or a file"
     )
 
 
 def read_at_scale(path: str | Path, mould_scale: float) -> Mould:
-    """Read a mould; a standard one at a scale, since people draw their own at the size that they cast.
+    """Read a mould; library moulds are scaled, whereas people draw their own at the size to be cast.
 
     Raises
     ------
@@ -65,22 +65,22 @@ def read_at_scale(path: str | Path, mould_scale: float) -> Mould:
 def read_mould(
     path: str | Path, scale: float | None = None, mm_per_l0: float | None = None, page: int | None = None
 ) -> Mould:
-    """Read a mould of the library, or a file that holds one mould.
+    """Read a library mould, or a file that holds one mould.
 
-    Without `scale` a drawing is fitted to the frame: its longest side becomes 52 l0. But a GeoJSON that lies
-    within the frame, and an SVG whose page is a square of 62.5 user units, are in l0 already.
+    Without `scale` a drawing is fitted to the frame: its longest side becomes 52 l0. A GeoJSON within the
+    frame, and an SVG whose page is a square of 62.5 user units, are in l0 already.
 
     Parameters
     ----------
     path : str or Path
-        Name of a standard mould, or a file: GeoJSON, SVG, DXF, or a picture (PNG, TIFF, JPEG, ...).
+        A library name, or a file: GeoJSON, SVG, DXF, or a picture (PNG, TIFF, JPEG, ...).
     scale : float, optional
         l0 per unit of the file: of a coordinate, of an SVG user unit, or of a pixel.
     mm_per_l0 : float, optional
-        Millimetres per l0. It sets the scale of a file that has a real unit (mm, cm, in, pt) if `scale` does
-        not; otherwise it only says how long an l0 is.
+        Millimetres per l0. For a file with a real unit (mm, cm, in, pt) it sets the scale, unless `scale`
+        does; otherwise it only records the length of l0.
     page : int, optional
-        Page of a picture that has several, from 1.
+        Page of a picture with several, from 1.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def read_mould(
             of = "l0 per unit" if name == "scale" else "mm per l0"
             raise RaptorError(f"{name} is {value}; give a positive number of {of} ({path.name})")
     suffix = path.suffix.lower()
-    # Imported here: a simulation job reads GeoJSON, and need not load what reads drawings.
+    # Imported here, because simulation jobs read only GeoJSON.
     if suffix in (".svg", ".svgz"):
         from raptor.moulds.svg import read_svg as read
     elif suffix == ".dxf":
@@ -107,7 +107,7 @@ def read_mould(
 
         return read_geojson(path, scale, mm_per_l0)
     else:
-        read_input(path, "mould file", "a mould")  # a missing file is called missing, whatever its suffix
+        read_input(path, "mould file", "a mould")  # reports a missing file whatever its suffix
         raise RaptorError(
             f"mould file {path} has the suffix '{path.suffix}'; a mould is read from {', '.join(SUFFIXES)}"
         )

@@ -9,12 +9,12 @@ from raptor.moulds.geometry import Mould, depth
 from raptor.moulds.random_moulds import GROUPS
 from raptor.symmetry import Element
 
-ALIKE = 0.25  # l0; how far the walls of a mould and of its image may lie apart
+ALIKE = 0.25  # l0; largest distance between the walls of a mould and its symmetry image
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a mould measures.
+    """Measures of a mould.
 
     Parameters
     ----------
@@ -23,17 +23,17 @@ class Summary:
     width, height : float
         Of the outline's bounding box along x and y, l0.
     area : float
-        Of the depression, tethers left out, l0^2.
+        Of the depression, without tethers, l0^2.
     tethers : int
         Their number.
     symmetry : str
         Its class, a key of `random_moulds.GROUPS`, found from its shape.
     layers, cells : int
-        Cells of so many layers cast in it.
+        Number of cells in the given number of layers.
     mm_per_l0 : float or None
-        Millimetres per l0, where it was drawn in a real unit.
+        Millimetres per l0, if it was drawn in a real unit.
     scaled : str
-        How a drawing was scaled.
+        Description of how a drawing was scaled.
     """
 
     mould: str
@@ -49,7 +49,7 @@ class Summary:
 
     @property
     def rows(self) -> dict[str, str]:
-        """What it says, by name, for people."""
+        """The measures as text, by name."""
         mm = self.mm_per_l0
         real = f" ({self.width * mm:.4g} x {self.height * mm:.4g} mm)" if mm else ""
         deep = f" ({depth(self.layers) * mm:.3g} mm deep)" if mm else ""
@@ -66,7 +66,7 @@ class Summary:
 
 
 def summarise(mould: Mould, layers: int = 7) -> Summary:
-    """Measure a mould, and cast so many layers in it.
+    """Measure a mould, cast with a number of layers.
 
     Raises
     ------
@@ -89,15 +89,15 @@ def summarise(mould: Mould, layers: int = 7) -> Summary:
 
 
 def area_apart(mould: Mould, other: Mould) -> float:
-    """Area that belongs to one depression alone, over that of the other mould's."""
+    """Area of the symmetric difference of two depressions, over that of the second."""
     return float(mould.depression.symmetric_difference(other.depression).area / other.depression.area)
 
 
 def symmetry_class(mould: Mould) -> str:
     """The largest symmetry class, a key of `random_moulds.GROUPS`, whose elements leave a mould unchanged.
 
-    Elements act about the origin; a mirror may have either axis. Walls may lie 0.25 l0 apart, so that a
-    painted mould has the class of the mould that it was painted after.
+    Elements act about the origin; a mirror may have either axis. Walls may differ by 0.25 l0, so that a
+    painted copy of a mould has the same class.
     """
     kept = {element for element in Element.all() if _looks_alike(mould, element)}
     turns = (Element(0, False), Element(1, False))
@@ -110,7 +110,7 @@ def symmetry_class(mould: Mould) -> str:
 
 
 def _looks_alike(mould: Mould, element: Element) -> bool:
-    """Whether the walls of a mould's image under an element are those of the mould."""
+    """Whether a mould is unchanged under an element."""
     moved = mould.transformed(element.matrix)
     pairs = [(mould.outline, moved.outline)]
     if mould.tethers:

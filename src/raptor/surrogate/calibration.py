@@ -1,4 +1,4 @@
-"""Calibration on the validation split: how errors follow from the disagreement of networks."""
+"""Calibration on the validation split: errors as a function of the disagreement of networks."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ from raptor.surrogate.inference import Ensemble, Surrogate, deviation
 from raptor.surrogate.out_of_distribution import TrainingSet, descriptors
 
 FACTORS = (0.8, 1.25)
-"""Bounds of the factor of the threshold of predicted tissues."""
+"""Bounds of the factor of the threshold for predicted tissues."""
 
 PIXELS = 400
-"""Of each sample, chosen at random within the depression."""
+"""Pixels of each sample, chosen at random within the depression."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A validation sample and what was predicted of it.
+    """A validation sample and its prediction.
 
     Parameters
     ----------
     cast : CastMould
     ratios : ndarray (2,)
-        A/A0 and w/w0, as simulated.
+        Simulated A/A0 and w/w0.
     density : ndarray (y, x)
-        Predicted by all networks.
+        Predicted by the ensemble.
     densities : ndarray (n, y, x)
         Predicted by each network.
     """
@@ -47,7 +47,7 @@ class Case:
     densities: NDArray[np.float32]
 
     def error(self, threshold: float) -> NDArray[np.float64]:
-        """Errors of A/A0 and w/w0, (2,), where tissue is what is above a threshold."""
+        """Errors of A/A0 and w/w0, (2,), for a threshold of tissue."""
         return np.nan_to_num(shape_ratios(self.density, self.cast, threshold)) - self.ratios
 
     def deviation(self, threshold: float) -> NDArray[np.float64]:
@@ -109,10 +109,10 @@ def _draw_pixels(found: Ensemble, sample: Sample, rng: np.random.Generator) -> N
 
 
 def fit_threshold(cases: Sequence[Case], threshold: float) -> float:
-    """The factor of the threshold at which A/A0 and w/w0 err least, by their mean absolute error.
+    """The factor of the threshold that minimises the mean absolute errors of A/A0 and w/w0.
 
-    Networks soften what they are not sure of: the contour of the simulated tissue's density lies outside
-    of the tissue in a softer image, and a higher one where the tissue ends.
+    Networks blur uncertain edges, which moves the contour at the simulations' threshold outwards; a higher
+    threshold brings it back.
     """
 
     def cost(factor: float) -> float:

@@ -65,7 +65,7 @@ def shell_offsets(distance: float) -> NDArray[np.int64]:
 
 
 def build_lattice(mould: Mould, parameters: CellParameters, model: NetworkModel) -> Lattice:
-    """Cast a mould: sites strictly inside its depression, and the bonds between them.
+    """Cast a mould: sites inside its depression, and the bonds between them.
 
     Raises
     ------

@@ -33,11 +33,14 @@ class CastMould:
         Of the lattice.
     pixels : int
         Per side of the images.
+    clearance : float
+        Least distance of a cell from a wall, l0.
     """
 
     mould: Mould
     layers: int
     pixels: int
+    clearance: float = CLEARANCE
 
     @cached_property
     def image(self) -> MouldImage:
@@ -57,7 +60,7 @@ class CastMould:
     @cached_property
     def sites(self) -> NDArray[np.float64]:
         """Sites (cells, 3), l0; raises as `cast_sites`."""
-        return cast_sites(self.mould, self.layers)
+        return cast_sites(self.mould, self.layers, self.clearance)
 
     @property
     def n_cells(self) -> int:
@@ -97,7 +100,7 @@ class CastMould:
         Indices of sites, one lattice step apart (`smallest_loop`).
         """
         starts = np.searchsorted(self.sites[:, 2], (np.arange(self.layers) + 0.25) / np.sqrt(2))
-        planes = [_plane(self.mould, 0.5 * parity) for parity in range(min(self.layers, 2))]
+        planes = [_plane(self.mould, 0.5 * parity, self.clearance) for parity in range(min(self.layers, 2))]
         found = []
         for tether in self.mould.tethers:
             paths = [smallest_loop(plane, centre_of(tether)) for plane in planes]
@@ -131,8 +134,8 @@ def thin_parts(mould: Mould) -> list[shapely.Polygon]:
     return [part for part in shapely.get_parts(joined) if part.buffer(-0.999 * THIN / 2).is_empty]
 
 
-def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
-    """Sites (cells, 3) strictly inside a mould's depression, l0, by layer, then y, then x.
+def cast_sites(mould: Mould, layers: int, clearance: float = CLEARANCE) -> NDArray[np.float64]:
+    """Sites (cells, 3) inside a mould's depression by at least a clearance, l0, by layer, then y, then x.
 
     Layer k lies at z = (k + 1/2) / sqrt 2; even layers have sites at integer x and y, odd layers at
     half-integer x and y, so that the point set has the full square symmetry about the image centre.
@@ -142,7 +145,7 @@ def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
     RaptorError
         If there is none.
     """
-    planes = [_plane(mould, 0.5 * parity) for parity in range(min(layers, 2))]
+    planes = [_plane(mould, 0.5 * parity, clearance) for parity in range(min(layers, 2))]
     heights = (np.arange(layers) + 0.5) / np.sqrt(2)
     parts = [
         np.column_stack([planes[layer % 2], np.full(len(planes[layer % 2]), height)])
@@ -180,11 +183,11 @@ def long_axis(mould: Mould) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return corners.mean(axis=0), sides[long] / 2
 
 
-def _plane(mould: Mould, shift: float) -> NDArray[np.float64]:
+def _plane(mould: Mould, shift: float, clearance: float) -> NDArray[np.float64]:
     """Sites (n, 2) of one layer, l0, by y, then x."""
     axis = np.arange(-HALF_SPAN, HALF_SPAN + 1) + shift
     points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    return points[mould.forbidden_depth(points) <= -CLEARANCE]
+    return points[mould.forbidden_depth(points) <= -clearance]
 
 
 def _across(middle: NDArray[np.float64], half: NDArray[np.float64]) -> shapely.LineString:

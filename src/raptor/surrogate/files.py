@@ -14,6 +14,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.scaling import Scaling
+from raptor.moulds.geometry import CLEARANCE, STRICTLY
 from raptor.surrogate.bands import Calibration
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
@@ -92,6 +93,8 @@ def load(folder: Path) -> Surrogate:
         architecture = Architecture.model_validate(content["architecture"])
         scaling = Scaling.from_json(content["normalisation"])
         layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "ensemble_size"))
+        # Before model version 3 cells stood right at the walls.
+        clearance = CLEARANCE if int(content["model_version"]) >= 3 else STRICTLY
     except (ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / MODEL} cannot be read: {error}") from error
     tensors, identity = _read_tensors(folder / WEIGHTS)
@@ -108,7 +111,7 @@ def load(folder: Path) -> Surrogate:
             f"{folder / WEIGHTS} does not fit the model that model.json describes; "
             f"keep the two files of one training together ({str(error).splitlines()[0]})"
         ) from error
-    return Surrogate(tuple(members), architecture, scaling, layers, pixels, calibration)
+    return Surrogate(tuple(members), architecture, scaling, layers, pixels, calibration, clearance)
 
 
 def _read_tensors(path: Path) -> tuple[dict[str, Tensor], str | None]:

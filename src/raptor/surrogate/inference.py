@@ -16,7 +16,7 @@ from raptor.fields.metrics import without_sign
 from raptor.fields.resample import block_average, deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
-from raptor.moulds.geometry import Mould
+from raptor.moulds.geometry import CLEARANCE, Mould
 from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Calibration
@@ -64,6 +64,8 @@ class Surrogate:
         Side of the predicted images; networks may work on block averages of these.
     calibration : Calibration or None
         Calibration of the errors, if measured.
+    clearance : float
+        Least distance of a cell from a wall in the tissues that they were trained on, l0.
     """
 
     members: tuple[Generator, ...]
@@ -72,6 +74,7 @@ class Surrogate:
     layers: int
     pixels: int
     calibration: Calibration | None = None
+    clearance: float = CLEARANCE
 
     def __post_init__(self) -> None:
         for member in self.members:
@@ -89,7 +92,7 @@ class Surrogate:
         return sum(parameter.numel() for parameter in self.members[0].parameters())
 
     def cast(self, mould: Mould | CastMould) -> CastMould:
-        """A mould cast with the layers and pixels of the networks; one already so cast is returned as is.
+        """A mould cast like the tissues that the networks learnt; one already so cast is returned as is.
 
         Raises
         ------
@@ -97,13 +100,13 @@ class Surrogate:
             If a cast mould has other layers or pixels.
         """
         if isinstance(mould, Mould):
-            return CastMould(mould, self.layers, self.pixels)
+            return CastMould(mould, self.layers, self.pixels, self.clearance)
         if (mould.layers, mould.pixels) != (self.layers, self.pixels):
             raise RaptorError(
                 f"{mould.mould.name} is cast with {mould.layers} layers and {mould.pixels} pixels; this "
                 f"model is for {self.layers} layers and {self.pixels} pixels"
             )
-        return mould
+        return mould if mould.clearance == self.clearance else self.cast(mould.mould)
 
     def predict(
         self, mould: Mould | CastMould, cells: Sequence[CellParameters], *, averaged: bool = True

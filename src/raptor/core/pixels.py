@@ -1,4 +1,4 @@
-"""Pixels of a picture of any common format, as a viewer shows them: turned, in colours, page by page."""
+"""Pixels of a picture of any common format, as a viewer displays them: orientation, colours, pages."""
 
 import logging
 import struct
@@ -18,7 +18,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
 
 MOST_PIXELS = 150_000_000  # of one page
-# Pillow and tifffile tell of damage by exceptions of many kinds.
+# Pillow and tifffile report damage by many kinds of exceptions.
 DAMAGE = (
     OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError, AttributeError, RuntimeError,
     ArithmeticError, MemoryError, struct.error, zlib.error,
@@ -32,7 +32,7 @@ TURNS: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     7: lambda p: p.swapaxes(0, 1)[::-1, ::-1],
     8: lambda p: np.rot90(p),
 }
-"""What a viewer does for each orientation of EXIF and TIFF."""
+"""Transformation for each orientation of EXIF and TIFF."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Pixels:
     Parameters
     ----------
     colours : array (row, column, 1 or 3)
-        Grey, or red, green and blue; from 0 to 1, but for files of floating point, which keep their values.
+        Grey, or red, green and blue; from 0 to 1, except that floating-point files keep their values.
     opacity : array (row, column) or None
-        From 0 to 1; None where the file has none.
+        From 0 to 1; None if the file has none.
     """
 
     colours: NDArray[np.float64]
@@ -52,7 +52,7 @@ class Pixels:
 
     @property
     def on_white(self) -> NDArray[np.float64]:
-        """Red, green and blue (row, column, 3) on white paper."""
+        """Red, green and blue (row, column, 3) on a white background."""
         rgb = np.broadcast_to(self.colours, (*self.colours.shape[:2], 3))
         if self.opacity is None:
             return np.array(rgb)
@@ -65,7 +65,7 @@ def read_pixels(path: Path, what: str = "picture", page: int | None = None) -> P
     Raises
     ------
     RaptorError
-        If the file is missing or no picture, has several pages and none is chosen, or is too large.
+        If the file is missing, not a picture or too large, or none of several pages is chosen.
     """
     path = Path(path)
     content = read_input(path, what, "a picture")
@@ -94,7 +94,7 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
     """A picture that Pillow reads."""
     picture: Image.Image = Image.open(BytesIO(content))
     _require_size(*picture.size, where)
-    # The further pictures of a camera's MPO file are previews.
+    # The other pictures of a camera's MPO file are previews.
     count = 1 if picture.format == "MPO" else int(getattr(picture, "n_frames", 1))
     picture.seek(_page(count, page, where) - 1)
     picture.load()
@@ -104,7 +104,7 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
         rgba = _scaled(np.asarray(picture.convert("RGBA")))
         opacity, colours = rgba[..., 3], rgba[..., :3]
         colours = colours[..., :1] if mode in ("LA", "La", "L") else colours
-    elif mode.startswith("I") or mode == "F":  # 16 and 32 bits of grey
+    elif mode.startswith("I") or mode == "F":  # 16-bit and 32-bit grey
         values = np.asarray(picture)
         colours = _scaled(values if values.dtype != np.int32 else _narrowed(values))[..., None]
     else:
@@ -116,9 +116,9 @@ def _other(content: bytes, where: str, page: int | None) -> Pixels:
 
 def _tiff(content: bytes, where: str, page: int | None) -> Pixels:
     """A page of a TIFF file; time points, slices and channels count as pages."""
-    import tifffile  # slow to load, and most pictures are no TIFF
+    import tifffile  # here, because it is slow to load and rarely needed
 
-    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it says of damage is raised below
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # damage is raised below
     with tifffile.TiffFile(BytesIO(content)) as file:
         planes = [
             (series, number)
@@ -163,7 +163,7 @@ def _planes(series: Any) -> int:
 
 
 def _page(count: int, page: int | None, where: str) -> int:
-    """The page to read, from 1; raises where it is not there, or not said and there are several."""
+    """The page to read, from 1; raises if it does not exist, or if none of several is chosen."""
     if page is None and count > 1:
         raise RaptorError(
             f"{where} holds {count} pages (time points, slices or channels); give --page 1 to {count}"
@@ -181,12 +181,12 @@ def _require_size(width: int, height: int, where: str) -> None:
 
 
 def _narrowed(values: NDArray[np.int32]) -> NDArray[Any]:
-    """Pillow's 32-bit integers in the 16 bits that files hold, where they fit."""
+    """Pillow's 32-bit integers as the 16 bits of the file, if they fit."""
     return values.astype(np.uint16) if values.min() >= 0 and values.max() < 65536 else values
 
 
 def _scaled(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Integers over the largest of their type, truth as 0 and 1; floating point as it is."""
+    """Integers over the largest of their type, booleans as 0 and 1; floating point unchanged."""
     if values.dtype.kind in "iu":
         return np.asarray(values * (1 / np.iinfo(values.dtype).max))
     return np.asarray(values, dtype=np.float64)

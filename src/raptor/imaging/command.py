@@ -1,4 +1,4 @@
-"""A measurement as a user asks for it."""
+"""Measurement as a user asks for it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,28 +26,29 @@ def measure(
 ) -> MeasuredPhotograph:
     """Measure A/A0, w/w0 and the outline of a tissue in a photograph or mask of its mould.
 
-    Look at `raptor.plot` of what it returns: nothing else shows a wrong edge.
+    Check the result with `raptor.plot`: nothing else shows a wrong edge.
 
     Parameters
     ----------
     photograph : str, Path or ndarray
         PNG, TIFF or JPEG file, or grey values (row, column).
     mould : Mould, str or Path
-        A mould, or what `read_mould` reads: a name of the library, or a file.
+        A mould, or a library name or file for `read_mould`.
     look : str
         "bright", "dark" or "auto": the tissue against the floor.
     threshold : float, optional
-        Brightness between floor and tissue, relative to the plate; Otsu's where not given.
+        Brightness between floor and tissue, relative to the plate; Otsu's by default.
     landmarks : sequence of str
-        Two or more of "column,row=x,y" or "column,row=tether 1", in place of the rim.
+        Two or more of "column,row=x,y" or "column,row=tether 1", instead of the rim.
     aligned : bool
         Whether the image is the frame, 62.5 l0 wide.
     mirrored : bool
         Whether it was taken from below or in a mirror.
     page : int, optional
-        Time point, slice or page of a file that has several, from 1.
+        Time point, slice or page of a file with several, from 1.
     channel : str, optional
-        red, green, blue, saturation or hue: what tells tissue from floor, in place of luminance.
+        red, green, blue, saturation or hue: the channel that separates tissue from floor, instead of
+        luminance.
 
     Raises
     ------

@@ -36,20 +36,20 @@ class Picture:
 
 
 def read_picture(path: Path, page: int | None = None, channel: str | None = None) -> Picture:
-    """Read a photograph or a mask as a viewer shows it; transparency is ignored.
+    """Read a photograph or a mask as a viewer displays it; transparency is ignored.
 
     Parameters
     ----------
     page : int, optional
-        Time point, slice or page of a file that has several, from 1.
+        Time point, slice or page of a file with several, from 1.
     channel : str, optional
-        What is taken for brightness: red, green, blue, saturation or hue; without it, luminance.
+        Channel used as brightness: red, green, blue, saturation or hue; luminance by default.
 
     Raises
     ------
     RaptorError
-        If the file is missing or not an image, has several pages and none is chosen, or is too small or of
-        one value; and if the channel is unknown or the picture is grey.
+        If the file is missing, not an image, too small or of one value, if none of several pages is chosen,
+        or if the channel is unknown or the picture is grey.
     """
     colours = read_pixels(path, "image", page).colours
     if min(colours.shape[:2]) < SMALLEST_SIDE:
@@ -72,15 +72,15 @@ def channel_of(colours: NDArray[np.float64], channel: str | None, name: str) -> 
     if channel is None:
         return colours[..., 0] if colours.shape[-1] == 1 else np.asarray(color.rgb2gray(colours))
     if grey:
-        raise RaptorError(f"{name} is grey, so it has no channel {channel}; leave --channel away")
+        raise RaptorError(f"{name} is grey, so it has no channel {channel}; drop --channel")
     return np.asarray(CHANNELS[channel](colours), dtype=np.float64)
 
 
 def hue(colours: NDArray[np.float64]) -> NDArray[np.float64]:
     """Colour (row, column) without lightness, 0.5 to 1, along the direction in which the colours differ.
 
-    Hue is an angle, and black and grey have none. In the plane of a* and b* (CIE 1976) two hues are two
-    points, and the principal axis of all pixels runs from one to the other.
+    Hue is an angle, undefined for black and grey. In the plane of a* and b* (CIE 1976) two hues are two
+    points, and the principal axis of all pixels connects them.
     """
     plane = color.rgb2lab(colours)[..., 1:]
     plane -= plane.mean(axis=(0, 1))
@@ -97,7 +97,7 @@ CHANNELS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "saturation": lambda colours: np.asarray(color.rgb2hsv(colours)[..., 1]),
     "hue": hue,
 }
-"""What may be taken for brightness where a tissue is told by its colour."""
+"""Channels that can replace brightness for a tissue distinguished by its colour."""
 
 
 def as_picture(pixels: NDArray[np.generic], name: str) -> Picture:

@@ -22,7 +22,7 @@ TINT = 0.3  # largest difference of green and blue, or excess over red, out of 1
 RED = 0.25  # least excess of red over green and blue in a tether, out of 1
 TOLERANCE = 0.5  # pixels; largest distance of a simplified wall from the contour
 BLUR = 1.0  # pixels; precision to which drawing programs place a wall
-MOST_PIXELS = 4096  # along a side
+MOST_PIXELS = 4096  # per side
 
 
 def read_bitmap(path: Path, page: int | None = None) -> Drawing:
@@ -43,12 +43,12 @@ def read_bitmap(path: Path, page: int | None = None) -> Drawing:
             "(1,000 are enough)"
         )
     sheet, walls = Page(-0.5, 0.5 - rows, columns, rows), tuple(_walls(colours, where))
-    # A square picture is the frame, as it is for photographs that are aligned with the mould.
+    # A square picture is the frame, as for photographs aligned with the mould.
     return Drawing(walls, (), sheet, "pixel", framed=rows == columns, blur=BLUR)
 
 
 def _walls(colours: NDArray[np.float64], where: str) -> Iterator[Shape]:
-    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their places."""
+    """Outline and tethers of a picture (row, column, 3), in pixels, y up; tethers with their positions."""
     _require_known(colours, where)
     light, redness = colours.min(axis=2), colours[..., 0] - colours[..., 1:].max(axis=2)
     grey = light[(light < WHITE) & (redness < RED)]
@@ -100,7 +100,7 @@ def _regions(field: NDArray[np.float64]) -> list[shapely.Polygon]:
 
 
 def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> shapely.Polygon:
-    """The wall of a painted region: a circle where it is round to half a pixel."""
+    """The wall of a painted region: a circle if it is round to half a pixel."""
     centre, radius = part.centroid, float(np.sqrt(part.area / np.pi))
     corners = shapely.get_coordinates(part)
     post = Circle(centre.x, centre.y, radius)
@@ -108,7 +108,7 @@ def _tether(part: shapely.Polygon, outline: shapely.Polygon) -> shapely.Polygon:
     if np.abs(reach - radius).max() < TOLERANCE and post.stands_in(outline):
         return post.polygon
     simple = part.simplify(TOLERANCE)
-    inside = simple.intersection(outline)  # a tether at the wall must not reach out by the tolerance
+    inside = simple.intersection(outline)  # simplification must not push a tether out through the wall
     return inside if inside.geom_type == "Polygon" and not inside.is_empty else simple
 
 

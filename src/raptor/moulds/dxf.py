@@ -1,8 +1,8 @@
-"""Moulds from CAD drawings: what the model space of a DXF file shows, by ezdxf (docs/moulds.md).
+"""Moulds from CAD drawings: the model space of a DXF file, read by ezdxf (docs/moulds.md).
 
-Closed polylines, circles, ellipses and splines are shapes; lines and arcs count where they close one
-together. Layers that are off or frozen, layers that are not printed, text, dimensions and points do not
-count. The name of a layer or block tells outline and tethers apart, as an SVG group's does.
+Closed polylines, circles, ellipses and splines are shapes; lines and arcs count if they close one together.
+Layers that are off, frozen or not printed, text, dimensions and points are ignored. The name of a layer or
+block gives the role of its content, like that of an SVG group.
 """
 
 import logging
@@ -31,15 +31,15 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
 from raptor.moulds.drawing import Drawing, Line, Shape, role_of
 
-# ezdxf tells of damage by exceptions of many kinds.
+# ezdxf reports damage by many kinds of exceptions.
 DAMAGE = (
     DXFError, struct.error, OSError, ValueError, KeyError, IndexError, TypeError, AttributeError,
     AssertionError, ArithmeticError, RecursionError,
 )  # fmt: skip
 BINARY = b"AutoCAD Binary DXF"
 DRAWN = {"LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE", "SOLID", "TRACE", "3DFACE"}
-HATCHES = {"HATCH", "MPOLYGON"}  # all that some programs write
-FLAT = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
+HATCHES = {"HATCH", "MPOLYGON"}  # some programs write nothing else
+FLAT = 1e-4  # of a shape's longer side: largest distance of a straightened curve from the drawn one
 MOST_SHAPES = 20_000
 
 
@@ -68,11 +68,11 @@ def read_dxf(path: Path) -> Drawing:
 
 
 def _document(content: bytes, where: str) -> Document:
-    """A DXF document, repaired where that can be done."""
+    """A DXF document, repaired if possible."""
     logging.getLogger("ezdxf").setLevel(logging.ERROR)
     try:
         if content.startswith(BINARY):
-            # As text, since ezdxf repairs text alone.
+            # As text, because ezdxf repairs only text.
             content = "".join(tag.dxfstr() for tag in binary_tags_loader(content)).encode(errors="replace")
         document, auditor = recover.read(BytesIO(content))
     except DAMAGE as error:
@@ -87,8 +87,8 @@ def _document(content: bytes, where: str) -> Document:
 
 
 def _pieces(document: Document) -> Iterator[Shape | Line]:
-    """What the model space draws, y up, drawing units."""
-    context = RenderContext(document, export_mode=True)  # as it is printed
+    """The shapes and lines of the model space, y up, drawing units."""
+    context = RenderContext(document, export_mode=True)  # as printed
     for outer in document.modelspace():
         if not isinstance(outer, DXFGraphic) or outer.dxftype() == "DIMENSION":
             continue

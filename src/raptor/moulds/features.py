@@ -1,7 +1,7 @@
 """Moulds from GeoJSON as people and geographic programs write it: shapely, QGIS, GDAL (docs/moulds.md).
 
-Polygons with or without holes, in one feature or several, in parts or collections; points with a radius
-and lines that close a shape. What lies within the frame is in l0; anything else is a drawing, and fitted.
+Polygons with or without holes, in one feature or several, in parts or collections; points with a radius and
+lines that close a shape. A mould within the frame is in l0; any other is fitted to it.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ DAMAGE = (
     AttributeError, TypeError, KeyError, IndexError, ValueError, OverflowError, shapely.GEOSException,
 )  # fmt: skip
 NAMES = ("role", "kind", "type", "mould", "name", "layer", "Layer", "id")
-"""Properties that may call a feature outline or tether."""
+"""Properties that may give a feature's role."""
 
 
 def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None = None) -> Mould:
@@ -32,7 +32,7 @@ def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None
     Raises
     ------
     RaptorError
-        If it is no GeoJSON, or holds no mould that can be cast, or several.
+        If it is not GeoJSON, or does not hold exactly one mould that can be cast.
     """
     path = Path(path)
     where = f"mould file {path}"
@@ -60,21 +60,21 @@ def read_geojson(path: Path, scale: float | None = None, mm_per_l0: float | None
 
 
 def _is_in_frame(geometry: dict[str, Any]) -> bool:
-    """Whether a polygon, or one whose numbers are none, has no corner outside the frame."""
+    """Whether a polygon has no corner outside the frame."""
     if geometry.get("type") not in ("Polygon", "MultiPolygon"):
         return False
     rings = geometry.get("coordinates") or []
     parts = [rings] if geometry["type"] == "Polygon" else rings
     corners = [float(value) for rings in parts for ring in rings for corner in ring for value in corner[:2]]
     if not corners:
-        return True  # NaN and emptiness are told of later
+        return True  # NaN and emptiness are reported later
     places = np.reshape(corners, (-1, 2))
     outside = np.abs(places).max() > IMAGE_SIZE / 2
     return not (outside or 0 < np.ptp(places, axis=0).max() < SMALLEST)
 
 
 def _shapes(feature: dict[str, Any], where: str) -> Iterator[Shape | Line]:
-    """What a feature draws: its outline, its holes and the tethers among its properties."""
+    """The shapes of a feature: its outline, its holes and the tethers among its properties."""
     properties = feature.get("properties") or {}
     words = [str(properties[name]) for name in NAMES if properties.get(name) is not None]
     words += [str(feature["id"])] if "id" in feature else []
@@ -100,7 +100,7 @@ def _shapes(feature: dict[str, Any], where: str) -> Iterator[Shape | Line]:
 
 
 def _geometries(geometry: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The geometries of a collection, or the one itself."""
+    """The geometries of a collection, or a single geometry."""
     if geometry.get("type") == "GeometryCollection":
         for part in geometry["geometries"]:
             yield from _geometries(part)
@@ -111,7 +111,7 @@ def _geometries(geometry: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _require_one_mould(features: list[dict[str, Any]], where: str) -> None:
-    """Raise a RaptorError where several features are moulds, with their own tethers."""
+    """Raise a RaptorError if several features are moulds with their own tethers."""
     count = sum("tethers" in (feature.get("properties") or {}) for feature in features)
     if count > 1:
         raise RaptorError(
@@ -120,7 +120,7 @@ def _require_one_mould(features: list[dict[str, Any]], where: str) -> None:
 
 
 def _require_one_piece(shapes: tuple[Shape, ...], where: str) -> None:
-    """Raise a RaptorError where shapes that are called no tether stand apart from each other."""
+    """Raise a RaptorError if shapes not named tether lie apart from each other."""
     bodies = sorted((shape for shape in shapes if shape.role != "tether"), key=lambda shape: -shape.size)
     apart = [shape for shape in bodies[1:] if not bodies[0].polygon.buffer(0).intersects(shape.polygon)]
     if apart:

@@ -68,7 +68,7 @@ def read_features(path: Path) -> list[dict[str, Any]]:
 
 
 def moulds_by_id(path: Path, only: Container[str] | None = None) -> dict[str, Mould]:
-    """The moulds that `read_moulds` reads, by id; raises as it does."""
+    """The moulds of `read_moulds` by id; raises the same errors."""
     return {mould.name: mould for mould in read_moulds(path, only)}
 
 
@@ -139,9 +139,9 @@ def tethers_of(properties: dict[str, Any], where: str) -> tuple[Tether, ...]:
         try:
             entries = json.loads(entries)
         except ValueError as error:
-            raise RaptorError(f"{where}: its tethers are no list: {error}") from error
+            raise RaptorError(f"{where}: its tethers are not a list: {error}") from error
     if not isinstance(entries, list):
-        raise RaptorError(f"{where}: its tethers are no list")
+        raise RaptorError(f"{where}: its tethers are not a list")
     return tuple(_tether(entry, f"{where}: tether {n}") for n, entry in enumerate(entries, start=1))
 
 

@@ -1,8 +1,8 @@
-"""What an SVG drawing shows, by a renderer (resvg): which shapes it draws, where, and what is seen of them.
+"""Visible shapes of an SVG drawing, their positions and visibility, by a renderer (resvg).
 
-The renderer applies style sheets, visibility, transforms and viewports. It answers with bounding boxes, so
-it is asked four times: for the drawing as it is, and with every shape shrunk to a point at the origin of its
-own coordinates, and along x and y from there. The three points give each shape's matrix.
+The renderer applies style sheets, visibility, transforms and viewports. It returns bounding boxes, so it is
+called four times: for the drawing itself, and with every shape shrunk to a point at the origin of its own
+coordinates, and along x and y from there. The three points give each shape's matrix.
 """
 
 import subprocess
@@ -27,40 +27,40 @@ SHAPES = ("path", "polygon", "polyline", "rect", "circle", "ellipse", "line")
 SVG = "{http://www.w3.org/2000/svg}"
 LINKS = ("href", "{http://www.w3.org/1999/xlink}href")
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-NAME = "data-raptor-name"  # the id that an element had
-FRAME = "raptor-frame"  # id of a shape of ours, whose matrix is the drawing's own
+NAME = "data-raptor-name"  # original id of an element
+FRAME = "raptor-frame"  # id of a shape of ours, whose matrix is that of the drawing
 CANVAS = 65536  # pixels along the longer side: bounding boxes have single precision and three decimals
-RASTER = 128  # pixels along the longer side of a shape that is looked at
-FAINTEST = 3  # of 255: the least opacity that is seen
+RASTER = 128  # pixels along the longer side of an inspected shape
+FAINTEST = 3  # of 255: smallest visible opacity
 HIDDEN = "visibility:hidden!important"
 UNPAINTED = "display:inline!important;transform:none!important;fill:none;stroke:none"
 NO_TEXT = "text,image,foreignObject{display:none!important}"
 CLEAR = "*{opacity:1!important}"
 UNCUT = "*{clip-path:none!important;mask:none!important;filter:none!important}"
 SOLID = "fill:#000!important;fill-opacity:1!important;stroke:none!important"
-DEEPEST = 8  # clones of clones
+DEEPEST = 8  # levels of clones of clones
 MOST_SHAPES = 3000
-ASK = "from resvg.__main__ import entrypoint; entrypoint()"  # the command `resvg`, wherever it is installed
+ASK = "from resvg.__main__ import entrypoint; entrypoint()"  # the command `resvg`, wherever installed
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A shape that is seen.
+    """A visible shape.
 
     Parameters
     ----------
     element : Element
-        With its own attributes; a clone has those of what it is a clone of.
+        With its own attributes; a clone has those of its original.
     words : tuple of str
-        Its id, classes and labels, and those of the groups that it is in, nearest first.
+        Its id, classes and labels, and those of its groups, nearest first.
     matrix : array (2, 3)
         From the element's coordinates to the drawing's user units, y down.
     box : array (4,)
         x, y, width and height of its bounding box, user units.
     filled : bool
-        Whether it is closed by its kind, or seen without its stroke.
+        Whether it is closed by its kind, or visible without its stroke.
     left : float
-        The share of it that clips and masks leave.
+        The share left by clips and masks.
     """
 
     element: Element
@@ -72,7 +72,7 @@ class Drawn:
 
 
 def drawn_shapes(root: Element, page: tuple[float, float]) -> list[Drawn]:
-    """The shapes that a document draws, in the order of drawing.
+    """The visible shapes of a document, in drawing order.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def drawn_shapes(root: Element, page: tuple[float, float]) -> list[Drawn]:
     Raises
     ------
     RaptorError
-        If the renderer refuses the document, or it draws too many shapes.
+        If the renderer rejects the document, or it has too many shapes.
     """
     document = _prepared(root, page)
     elements = {element.get("id", ""): element for element in document.iter() if tag_of(element) in SHAPES}
@@ -111,7 +111,7 @@ def tag_of(element: Element) -> str:
 
 
 def _words(element: Element | None, parents: dict[Element, Element]) -> Iterator[str]:
-    """What an element, and the groups that it is in, are called."""
+    """Names of an element and of its groups."""
     while element is not None:
         yield from (element.get(NAME, element.get("id", "")), *element.get("class", "").split())
         yield element.get(LABEL, "")
@@ -119,9 +119,9 @@ def _words(element: Element | None, parents: dict[Element, Element]) -> Iterator
 
 
 def _prepared(root: Element, page: tuple[float, float]) -> Element:
-    """A copy of a document with its clones drawn out, an id for every shape, and a shape of ours in it."""
+    """A copy of a document with its clones expanded, an id for every shape, and a shape of ours."""
     document = deepcopy(root)
-    for key in ("x", "y"):  # of an outermost element, they mean nothing
+    for key in ("x", "y"):  # meaningless on an outermost element
         document.attrib.pop(key, None)
     document.attrib |= {"width": repr(page[0]), "height": repr(page[1]), "overflow": "visible"}
     known = {element.get("id"): element for element in reversed(list(document.iter()))}
@@ -138,7 +138,7 @@ def _prepared(root: Element, page: tuple[float, float]) -> Element:
 
 
 def _draw_out(element: Element, known: dict[str, Element], made: list[int], depth: int) -> None:
-    """Put in place of each `use` within an element what it shows, so that the parts keep their ids.
+    """Replace each `use` within an element by a copy of its target, so that the parts keep their ids.
 
     `made` counts the clones; a clone of a clone has `depth` 1.
     """
@@ -159,7 +159,7 @@ def _draw_out(element: Element, known: dict[str, Element], made: list[int], dept
             shown.tag = f"{SVG}svg"
             sides = zip(("width", "height"), size, strict=True)
             shown.attrib |= {key: side or shown.get(key, "100%") for key, side in sides}
-        # The place comes after the transform of the clone.
+        # The position applies after the transform of the clone.
         place = Element(f"{SVG}svg", {"x": x or "0", "y": y or "0", "overflow": "visible"})
         place.append(shown)
         part.append(place)
@@ -187,7 +187,7 @@ def _as_points(document: Element, point: tuple[float, float]) -> Element:
 
 
 def _text(inner: str, size: tuple[float, float], view: tuple[float, float, float, float]) -> str:
-    """A picture of `size` pixels that shows the part `view` (x, y, width, height) of a document as text."""
+    """A document, as text, that shows the part `view` (x, y, width, height) of another on `size` pixels."""
     box = " ".join(f"{value:.9g}" for value in view)
     sides = f'width="{size[0]:.9g}" height="{size[1]:.9g}"'
     return f'<svg xmlns="{SVG[1:-1]}" {sides} viewBox="{box}">{inner}</svg>'
@@ -198,7 +198,7 @@ def _as_text(document: Element) -> str:
 
 
 def _boxes(text: str) -> dict[str, NDArray[np.float64]]:
-    """Bounding boxes (x, y, width, height) of all that a document draws and that has an id, pixels."""
+    """Bounding boxes (x, y, width, height) of all drawn elements with an id, pixels."""
     command = [sys.executable, "-P", "-c", ASK, "--query-all", "--skip-system-fonts", "--quiet", "-"]
     run = subprocess.run(command, input=text.encode(), capture_output=True, check=False)
     if run.returncode:
@@ -211,7 +211,7 @@ def _boxes(text: str) -> dict[str, NDArray[np.float64]]:
 def _places(
     document: Element, page: tuple[float, float]
 ) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
-    """Bounding boxes (4,) and matrices (3, 3) of what a document draws, by id, in CSS pixels of the page."""
+    """Bounding boxes (4,) and matrices (3, 3) of drawn elements, by id, in CSS pixels of the page."""
     zoom, far = CANVAS / max(page), max(page)
     size, view = (zoom * page[0], zoom * page[1]), (0.0, 0.0, *page)
     points = ((0.0, 0.0), (far, 0.0), (0.0, far))
@@ -226,21 +226,21 @@ def _places(
             along = [(each[name] - origin) / far for each in middles[1:]]
             matrices[name] = np.vstack([np.column_stack([*along, origin]), [0.0, 0.0, 1.0]])
     if FRAME not in matrices:
-        raise RaptorError("nothing of it is drawn; look at its width, height and viewBox")
+        raise RaptorError("nothing of it is visible; check its width, height and viewBox")
     return boxes, matrices
 
 
 def _looks(
     document: Element, page: tuple[float, float], shapes: list[Element], boxes: dict[str, NDArray[np.float64]]
 ) -> list[tuple[bool, float] | None]:
-    """For each shape whether it is filled, and the share of it that clips leave; None where it is unseen."""
+    """For each shape whether it is filled, and the share left by clips; None if invisible."""
     document = deepcopy(document)
     ElementTree.SubElement(document, f"{SVG}style").text = NO_TEXT
     names = {shape.get("id", ""): number for number, shape in enumerate(shapes)}
     for element in document.iter():
         number = names.get(element.get("id", ""))
         if number is not None:
-            # Of a property that it does not know, the renderer takes no notice.
+            # The renderer ignores properties that it does not know.
             own = element.get("style", "").strip(" ;\n\t")
             element.set("style", f"{own};{HIDDEN};raptor:{number};".strip(";") + ";")
     whole_text, looks = _as_text(document), list[tuple[bool, float] | None]()
@@ -255,7 +255,7 @@ def _looks(
             shown = text.replace(f"{HIDDEN};raptor:{number};", style)
             return _alpha(shown.replace(NO_TEXT, NO_TEXT + sheet))
 
-        if opacity(f"stroke-width:{0.4 * margin:.9f}").max() < FAINTEST:  # a hairline is seen, too
+        if opacity(f"stroke-width:{0.4 * margin:.9f}").max() < FAINTEST:  # a hairline is visible too
             looks.append(None)
             continue
         left = 1.0

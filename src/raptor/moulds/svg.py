@@ -1,8 +1,8 @@
-"""Moulds drawn as SVG: what a renderer shows, told apart by names or by size (docs/moulds.md).
+"""Moulds drawn as SVG: the shapes that a renderer shows, distinguished by name or size (docs/moulds.md).
 
-A shape is a path, polygon, polyline, rectangle, circle or ellipse that is seen; strokes, fills, text and
-images do not count. A path of several pieces is several shapes. An open piece is a shape where it is filled,
-and otherwise a line.
+A shape is a visible path, polygon, polyline, rectangle, circle or ellipse; strokes, fills, text and images
+are ignored. A path of several pieces is several shapes. An open piece is a shape if it is filled, otherwise
+a line.
 """
 
 import gzip
@@ -26,9 +26,9 @@ from raptor.moulds.geometry import CIRCLE_SEGMENTS
 from raptor.moulds.rendering import SHAPES, Drawn, drawn_shapes, tag_of
 
 NAMESPACE = "http://www.w3.org/2000/svg"
-SMOOTH = 1e-4  # of a shape's longer side: how far its straightened curves may leave the drawn ones
-AGREED = 2e-3  # of a shape's longer side: how far it may lie from where the renderer draws it
-CUT, WHOLE = 0.02, 0.98  # of a shape: clipped away, and not clipped
+SMOOTH = 1e-4  # of a shape's longer side: largest distance of a straightened curve from the drawn one
+AGREED = 2e-3  # of a shape's longer side: largest distance from where the renderer draws it
+CUT, WHOLE = 0.02, 0.98  # share of a shape left if clipped away, and if not clipped
 LENGTHS = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "x1", "y1", "x2", "y2"}
 LENGTH = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(px|pt|pc|mm|cm|in|%)?\s*")
 PATH_DATA = re.compile(r"\s*([Mm][MmZzLlHhVvCcSsQqTtAaEe\d\s.,+-]*)?")
@@ -87,7 +87,7 @@ def _root(content: bytes, where: str) -> Element:
 
 
 def _require_readable(element: Element) -> None:
-    """Raise a RaptorError for a shape that a renderer would drop, or cut short, without a word."""
+    """Raise a RaptorError for a shape that a renderer would silently drop or truncate."""
     tag, attributes = tag_of(element), element.attrib
     if tag not in SHAPES:
         return
@@ -107,7 +107,7 @@ def _require_readable(element: Element) -> None:
         reason = f" ({error})" if str(error) else ""
         raise RaptorError(
             f"<{tag}> '{attributes.get('id', 'without id')}' cannot be read{reason}; draw it again, or "
-            "take it out"
+            "delete it"
         ) from error
 
 
@@ -145,7 +145,7 @@ def _page(root: Element) -> tuple[Page | None, float | None, tuple[float, float]
 
 
 def _geometries(elements: list[Element], page: Page | None) -> list[Any]:
-    """Shapes in their own coordinates, as svgelements has them."""
+    """Shapes in their own coordinates, from svgelements."""
     width, height = (page.width, page.height) if page else (1000.0, 1000.0)
     sheet = Element("svg", {"xmlns": NAMESPACE, "width": repr(width), "height": repr(height)})
     for number, element in enumerate(elements):
@@ -192,12 +192,12 @@ def _pieces(drawn: Drawn, geometry: Any) -> Iterator[Shape | Line]:
             raise RaptorError(
                 f"{name} is cut by a clip or a mask; apply it, so that the shape ends where it is cut"
             )
-        # What else a path called outline holds stands within its largest piece.
+        # The other pieces of a path called outline are tethers within its largest piece.
         yield Shape(name, shape.polygon, "tether") if number and role == "outline" else shape
 
 
 def _require_agreement(path: Any, drawn: Drawn, name: str) -> None:
-    """Raise a RaptorError where the renderer draws a shape elsewhere than it was read."""
+    """Raise a RaptorError if the renderer draws a shape elsewhere than it was read."""
     box = path.bbox()
     if box is None:
         return
@@ -210,7 +210,7 @@ def _require_agreement(path: Any, drawn: Drawn, name: str) -> None:
 
 
 def _name(drawn: Drawn) -> str:
-    """What messages call a shape: its id, or its kind and where it lies in the drawing."""
+    """A shape's name in messages: its id, or its kind and position in the drawing."""
     if drawn.words[0] and not drawn.words[0].startswith("raptor-"):
         return f"'{drawn.words[0]}'"
     x, y = drawn.box[:2] + drawn.box[2:] / 2
@@ -218,7 +218,7 @@ def _name(drawn: Drawn) -> str:
 
 
 def _points(segment: Any) -> list[Any]:
-    """Points along a segment of a path, its start left out."""
+    """Points along a segment of a path, without its start."""
     if isinstance(segment, (svgelements.CubicBezier, svgelements.QuadraticBezier, svgelements.Arc)):
         return [segment.point(t) for t in np.linspace(0, 1, CIRCLE_SEGMENTS + 1)[1:]]
     return [] if segment.end is None else [segment.end]

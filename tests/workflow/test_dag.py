@@ -13,7 +13,7 @@ PAPER = "results/tiny/campaigns/paper/fields.nc"
 
 CHAIN = {
     "compile_kernels", "design_campaign", "simulate_shard", "build_stack", "list_examples", "check_campaign",
-    "write_card", "check_splits",
+    "write_card", "tabulate_campaign", "check_splits",
 }  # fmt: skip
 """What makes every campaign, whatever its kind."""
 TRAINING = {"fit_scaling", "train_member", "assemble_model"}
@@ -21,7 +21,7 @@ EVALUATION = {
     "measure_floor", "evaluate_model", "summarise_evaluation", "compare_models", "predict_samples",
     "ship_model",
 }  # fmt: skip
-SWEEPS = {"tabulate_campaign", "predict_campaign", "compare_contraction"}
+SWEEPS = {"predict_campaign", "compare_contraction"}
 TRADEOFF = {"measure_tradeoff", "tabulate_tradeoff", "plot_folding"}
 FITS = {"fit_tissue", "fit_by_simulator", "infer_parameters", "fit_outline", "tabulate_fits"}
 REPORT = {"record_configuration", "write_report", "report", "all"}
@@ -107,7 +107,7 @@ def test_a_change_runs_what_hangs_on_it_and_no_more(place, tmp_path, change, not
 )
 def test_a_change_makes_its_part_of_a_campaign_again(place, tmp_path, change, jobs):
     found = place.jobs("campaign_paper", configuration=variant(tmp_path, **change))
-    assert found - {"campaign_paper", "tabulate_campaign"} == jobs
+    assert found - {"campaign_paper"} == jobs
 
 
 def test_a_further_campaign_leaves_the_others_alone(place, tmp_path):
@@ -119,7 +119,7 @@ def test_a_further_campaign_leaves_the_others_alone(place, tmp_path):
 @pytest.mark.parametrize(
     ("target", "needed", "not_needed"),
     [
-        ("campaign_paper", CHAIN - {"check_splits"} | {"tabulate_campaign"}, TRAINING | {"check_splits"}),
+        ("campaign_paper", CHAIN - {"check_splits"}, TRAINING | {"check_splits"}),
         ("results/tiny/studies/sweep/simulated.csv", {"tabulate_campaign"}, TRAINING),
         ("campaigns", CHAIN, EVALUATION | FITS),
         ("train", TRAINING, EVALUATION | FITS),

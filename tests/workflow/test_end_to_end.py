@@ -93,7 +93,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert {"generator_loss", "discriminator_loss", "validation_error"} <= set(history.columns)
     active = pd.read_csv(results / "surrogate" / "active" / "training.csv")
     assert active["epoch"].tolist() == [0, 1, 2]
-    assert active["distance"].tolist()[:2] == history["distance"].tolist()[:2]
+    assert active["reconstruction_loss"].tolist()[:2] == history["reconstruction_loss"].tolist()[:2]
     selected = pd.read_csv(results / "campaigns" / "active" / "design.csv")
     assert selected["split"].tolist() == ["train", "train"]
     assert (selected["disagreement"] > 0).all()

@@ -8,7 +8,7 @@ EVALUATED = [
     if name not in TRAINING and campaign.kind and campaign.tests and not campaign.grid
 ]
 REPEATS = [
-    name for name, campaign in CAMPAIGNS.items() if campaign.repeat_of == TRAINING
+    name for name, campaign in CAMPAIGNS.items() if campaign.repeat_of in TRAINING
 ]
 
 

@@ -1,4 +1,4 @@
-"""Put the members of a model together, and calibrate them on the validation split."""
+"""Assemble the networks of a model, and calibrate them on the validation split."""
 
 from dataclasses import replace
 from pathlib import Path

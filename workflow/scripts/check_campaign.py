@@ -1,4 +1,4 @@
-"""Check a campaign; name every fault."""
+"""Check a campaign and list every fault."""
 
 from pathlib import Path
 

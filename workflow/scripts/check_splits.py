@@ -1,4 +1,4 @@
-"""Check that no mould stands in two splits of any campaigns; name every one that does."""
+"""Check that no mould is in two splits of any campaigns, and list those that are."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Put simulated and predicted contraction of a campaign into one table, and say where they differ most."""
+"""Compare simulated and predicted contraction of a campaign, and find the largest difference."""
 
 import json
 from pathlib import Path

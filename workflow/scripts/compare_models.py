@@ -1,4 +1,4 @@
-"""Put every model's cost and errors into one table."""
+"""Collect cost and errors of all models in one table."""
 
 import json
 from pathlib import Path

@@ -12,7 +12,7 @@ with logged(snakemake.log[0]):
     if snakemake.input.repeated:
         table, moulds = map(Path, snakemake.input.repeated)
         base = read_design(table), moulds_by_id(moulds)
-    if snakemake.input.model:  # torch is imported where a model selects the runs
+    if snakemake.input.model:  # only a selection by a model needs torch
         from raptor.studies.active_learning import disagreement_of
         from raptor.surrogate.files import load
 

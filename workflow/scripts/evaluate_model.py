@@ -1,4 +1,4 @@
-"""Evaluate a model, or a guess without a network, on the test runs of a campaign."""
+"""Evaluate a model, or a baseline without a network, on the test runs of a campaign."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from raptor.surrogate.baselines import baseline
 
 with logged(snakemake.log[0]):
     if snakemake.input.weights:
-        import torch  # guesses need not wait for it
+        import torch  # not needed by baselines
 
         from raptor.surrogate.files import load
 

@@ -1,4 +1,4 @@
-"""Fit one tissue by the simulator, from the surrogate's fit on; simulate it again with further seeds."""
+"""Fit one tissue by the simulator, from the surrogate's fit, and verify the fit with new seeds."""
 
 import json
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""Fit a simulated tissue, whose parameters are known, by its ratios and by its whole outline."""
+"""Fit a simulated tissue with known parameters, by its ratios and by its whole outline."""
 
 from pathlib import Path
 

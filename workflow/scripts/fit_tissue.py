@@ -1,4 +1,4 @@
-"""Fit one tissue by the surrogate, correct the fit by a few simulations, and simulate both again."""
+"""Fit one tissue by the surrogate, correct the fit by a few simulations, and verify both."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Posterior and profiles of a tissue's parameters, and what a further measurement would tell of them."""
+"""Infer the posterior of a tissue's parameters, and rank further measurements."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Measure the noise of simulations from seed to seed."""
+"""Measure the seed-to-seed noise of simulations."""
 
 from pathlib import Path
 

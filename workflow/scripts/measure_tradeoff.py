@@ -10,7 +10,7 @@ from raptor.studies.tradeoff import REFERENCES, Trial, compare
 with logged(snakemake.log[0]):
     surrogate = None
     if snakemake.input.surrogate:
-        import torch  # a comparison of simulations need not wait for it
+        import torch  # not needed to compare simulations
 
         from raptor.surrogate.files import load
 

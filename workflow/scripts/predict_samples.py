@@ -1,4 +1,4 @@
-"""Predict the held-out samples that figures show."""
+"""Predict the held-out samples shown in figures."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Write the surrogate as the package ships it: two files, small, and its card."""
+"""Write the surrogate for the package: two small files and its card."""
 
 import json
 from pathlib import Path

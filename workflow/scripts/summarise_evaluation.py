@@ -1,4 +1,4 @@
-"""Gather a model's errors: test split, regions of the parameters, other campaigns."""
+"""Summarise a model's errors: test split, regions of the parameters, other campaigns."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Put area and width of every simulation of a campaign into a table."""
+"""Tabulate area and width of every simulation of a campaign."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Put the cases of the trade-off into one table, and sum them up by method."""
+"""Collect the cases of the trade-off in one table, and summarise them by method."""
 
 from pathlib import Path
 

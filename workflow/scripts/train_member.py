@@ -25,7 +25,7 @@ with logged(snakemake.log[0]):
     begun = Path(snakemake.input.initial[0]).parent if snakemake.input.initial else None
     pixels, scaling = read_table(stacks[0]).pixels, read_scaling(Path(snakemake.input.normalisation))
     architecture = rules.architecture(pixels)
-    # A checkpoint goes on only if configuration and data are those that it was made from.
+    # A checkpoint is used only if configuration and data are those of its training.
     data = [path.read_text() for path in (*files, Path(snakemake.input.normalisation))]
     data += [str(read_table(stack).parameters) for stack in stacks]
     data += [(begun / "model.json").read_text()] if begun else []

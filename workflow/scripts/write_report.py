@@ -1,4 +1,4 @@
-"""Write the report that is read from the top."""
+"""Write the report."""
 
 from pathlib import Path
 

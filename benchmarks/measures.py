@@ -66,6 +66,10 @@ def main(
     for what, new, literal in rows:
         table.add_row(what, *(f"{value:+.4f}" for value in (*new, *literal)))
     CONSOLE.print(table)
+    moulds = [*map(read_mould, MOULDS), *(mould for _, mould in paper_designs(50))]
+    CONSOLE.print(
+        f"Delta 0, {len(MOULDS)} moulds of the library and 50 drawn: off 1 by at most {at_rest(moulds):.1e}"
+    )
     for what, change in (("rounded to 1e-3 l0", rounded), ("moved by up to 3e-7 l0", shaken)):
         worst = max((changed_cells(mould, change), mould.name) for mould in map(read_mould, MOULDS))
         CONSOLE.print(
@@ -101,6 +105,13 @@ def seeds(designs: int) -> pd.DataFrame:
             row = dict(zip(names, both(made).ravel().tolist(), strict=True))
             rows.append({"simulation": run.simulation, "lost": made.posts_lost, **row})
     return pd.DataFrame(rows)
+
+
+def at_rest(moulds: Iterable[Mould]) -> float:
+    """How far from 1 a ratio is, at most, in tissues simulated at Delta 0."""
+    tissues = [simulate(mould, replace(CELLS, delta=0.0), 7, "draft") for mould in moulds]
+    ratios = [ratio for made in tissues for ratio in (made.area_ratio, made.width_ratio)]
+    return float(np.nanmax(np.abs(np.array(ratios) - 1)))
 
 
 def paper_designs(count: int) -> list[tuple[Run, Mould]]:

@@ -42,7 +42,7 @@ def moulds() -> list[Mould]:
 
 def drawn_at(mould: Mould, part: float) -> Mould:
     """The mould scaled so that it is as wide as a part of the frame."""
-    return mould.scaled(part * IMAGE_SIZE / (2 * np.abs(mould.outline.bounds).max()))
+    return mould.scaled(part * 0.999 * IMAGE_SIZE / (2 * np.abs(mould.outline.bounds).max()))
 
 
 def measured(

@@ -7,13 +7,14 @@ import os
 import re
 import shutil
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from raptor.fitting import command, least_squares
+from raptor.fitting import command, least_squares, posterior
 from tests.small import ROOT
 
 pytestmark = pytest.mark.one_processor
@@ -40,8 +41,10 @@ def masked(text):
 
 def test_the_page_s_blocks_print_what_it_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for module, name, few in ((command, "STARTS", 4), (least_squares, "REFINED", 1), (command, "POINTS", 16)):
-        monkeypatch.setattr(module, name, few)  # a fit in seconds
+    # A fit in seconds.
+    monkeypatch.setattr(command, "minimise", partial(least_squares.minimise, starts=4))
+    monkeypatch.setattr(command, "survey", partial(posterior.survey, points=16))
+    monkeypatch.setattr(least_squares, "REFINED", 1)
     for code, shown, printed in run(tmp_path):
         assert masked(printed) == masked(shown), code
     assert len(list(tmp_path.glob("*.png"))) == 4

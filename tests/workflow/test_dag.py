@@ -77,6 +77,7 @@ def test_another_measurement_runs_no_campaign(place, tmp_path):
                 "check_campaign",
                 "write_card",
                 "check_splits",
+                "tabulate_campaign",
             },
         ),
         ({"tradeoff__methods": ["draft"]}, CHAIN | TRAINING | FITS | SWEEPS),

@@ -102,6 +102,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert metrics["paper"]["samples"] == 2
     assert set(metrics["paper"]["bulk"]) == {
         "P", "N", "T", "Tbar", "SxSx", "SxSxbar", "SySy", "SySybar", "area_ratio", "width_ratio",
+        "alignment", "anisotropy",
     }  # fmt: skip
     assert all(0 <= share <= 1 for share in metrics["paper"]["coverage"].values())
     floor = pd.read_csv(results / "evaluation" / "floor.csv")

@@ -42,4 +42,6 @@ def test_images_of_a_mould_have_equal_ratios_within_the_spread_of_seeds():
     for element in Element.all():
         made = simulate(POSTS.transformed(element.matrix), MIDDLE, 2, "standard", seed=element.index)
         ratios.append((made.area_ratio, made.width_ratio, made.alignment))
-    assert np.ptp(ratios, axis=0) == pytest.approx(0, abs=0.03)
+    # The range of eight seeds is about three spreads: 0.007 of the ratios and 0.04 of the alignment, whose
+    # domains are spontaneous.
+    assert (np.ptp(ratios, axis=0) < (0.03, 0.03, 0.12)).all()

@@ -126,12 +126,12 @@ def tradeoff_cases() -> list[Case]:
     content = yaml.safe_load((ROOT / "config/tradeoff.yaml").read_text())
     return [
         Case(
-            case["name"],
+            name,
             read_mould(case["mould"]),
-            case.get("layers", content["model"]["layers"]),
+            case.get("layers", content["layers"]),
             (case["delta"], case["kappa_nnn"], case["kappa_nnnn"]),
         )
-        for case in content["tradeoff"]["cases"]
+        for name, case in content["tradeoff"]["cases"].items()
     ]
 
 

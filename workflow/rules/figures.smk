@@ -71,17 +71,12 @@ if MODELS:
             options={"models": list(MODELS)},
         ),
     }
-    tuned = [name for name, model in MODELS.items() if len(model.campaigns) > 1]
+    tuned = [name for name, model in MODELS.items() if model.initial_weights]
     if tuned:
         TABLE_FIGURES["active_learning"] = dict(
             kind="active_learning",
             inputs={"regions": rules.compare_models.output.regions},
-            options={
-                "models": [
-                    MODELS[tuned[0]].initial_weights or next(iter(MODELS)),
-                    *tuned,
-                ]
-            },
+            options={"models": [MODELS[tuned[0]].initial_weights, *tuned]},
         )
     samples = {
         "samples": rules.predict_samples.output.samples,

@@ -82,7 +82,7 @@ def test_corners_and_edges_of_the_parameters(delta, kappas, layers):
 
 
 def test_a_run_that_cannot_converge_says_so():
-    hasty = Accuracy("contract", Contraction(0.3, 5, 5e-3, 1e-9, 30))
+    hasty = Accuracy("contract", Contraction(0.3, 5, 5e-3, 5e-3, 1e-9, 30, 30))
     tissue = simulate(POSTED, SOFT, NetworkModel(2), hasty, 0)
     assert_sound(tissue)
     assert not tissue.converged

@@ -46,10 +46,12 @@ class Accuracy:
 
 
 ACCURACIES: dict[str, Accuracy] = {
-    # Residual gradient over Delta: 0.03, 0.02, 0.001 kappa0 l0.
-    "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, 3e-2, 1500)),
-    "standard": Accuracy("contract", Contraction(0.3, 10, 5e-3, 2e-2, 10000, 250), precision="mixed"),
-    "reference": Accuracy("contract", Contraction(0.05, 200, 1e-2, 1e-3, 30000), hops=5, hop_sweeps=300),
+    # Shortening, sweeps, ftol, ftol of the last step, gradient, evaluations of a step and of the last.
+    "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, -1.0, 0.03, 1500, 1500)),
+    "standard": Accuracy("contract", Contraction(0.3, 10, 5e-3, 3e-4, 0.3, 250, 10000), precision="mixed"),
+    "reference": Accuracy(
+        "contract", Contraction(0.05, 200, 1e-2, 1e-2, 1e-3, 30000, 30000), hops=5, hop_sweeps=300
+    ),
 }
 """What `accuracy: draft | standard | reference` means."""
 
@@ -58,7 +60,7 @@ ALLOWED = "draft, standard, reference, anneal-SWEEPS and anneal-SWEEPS-minimised
 
 def annealed(sweeps: int, minimised: bool = False) -> Accuracy:
     """The paper's anneal of so many sweeps, as it stands or with a last minimisation."""
-    last = Contraction(1.0, 0, -1.0, 1e-3, 30000 if minimised else 1)
+    last = Contraction(1.0, 0, -1.0, -1.0, 1e-3, 1, 30000 if minimised else 1)
     return Accuracy("anneal", last, anneal_sweeps=sweeps, minimised=minimised)
 
 

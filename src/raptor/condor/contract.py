@@ -42,20 +42,23 @@ class Contraction:
     sweeps : int
         Metropolis sweeps of each step before minimisation.
     ftol : float
-        A step ends when 25 more evaluations lower the energy by no more than this fraction; the last
-        must meet the tolerance too. Less than zero: only the tolerance counts.
-    tolerance : float
-        Largest component of the gradient at the end, in kappa0 l0 times Delta.
-    max_evaluations : int
-        Largest number of evaluations of the last minimisation.
+        A step but the last ends when 25 more evaluations lower the energy by no more than this part.
+    last_ftol, tolerance : float
+        The last ends when they lower it by no more than `last_ftol`, and the largest component of the
+        gradient is within the tolerance, in kappa0 l0 times Delta. `last_ftol` less than zero: the
+        tolerance alone counts.
+    step_evaluations, max_evaluations : int
+        Evaluations of a minimisation at most: of each before the last, since a later one puts right what it
+        leaves, and of the last.
     """
 
     shortening: float
     sweeps: int
     ftol: float
+    last_ftol: float
     tolerance: float
+    step_evaluations: int
     max_evaluations: int
-    step_evaluations: int = 30000
 
 
 def agitation_temperature(delta: float) -> float:
@@ -145,9 +148,9 @@ def _minimise(
         system.network,
         system.walls,
         delta,
-        tolerance=contraction.tolerance,
-        ftol=contraction.ftol,
-        thorough=last and contraction.ftol >= 0,
+        tolerance=contraction.tolerance if last else 0.0,
+        ftol=contraction.last_ftol if last else contraction.ftol,
+        thorough=last and contraction.last_ftol >= 0,
         contact=contact,
         max_evaluations=contraction.max_evaluations if last else contraction.step_evaluations,
     )

@@ -37,6 +37,7 @@ MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
 WINDOW = 25  # evaluations over which the fall of the energy is judged
+SMALL_ENERGY = 3e-3  # kappa0 l0^2 a cell, over Delta^2: falls of less energy are judged by this
 BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the innermost cache
 
 
@@ -45,7 +46,7 @@ class Minimum(NamedTuple):
 
     `state` as in `energy`, `energy` of the bonds and `wall_energy` of walls and contacts (kappa0 l0^2),
     `residual_gradient` its largest component (kappa0 l0; orientations as in `orientation_lever`),
-    `evaluations` of the objective, whether the gradient fell below the tolerance, and the stiffness
+    `evaluations` of the objective, whether it converged as was asked for, and the stiffness
     of the contacts that acted (kappa0).
     """
 
@@ -276,7 +277,7 @@ def _search_kernel(state, before, slope, length, network, walls, delta, contact,
 def _minimise_kernel(
     state, network, walls, delta, contact, lever, tolerance, ftol, thorough, max_evaluations, work
 ):
-    """Minimise in place; returns bond energy, wall energy, largest gradient, evaluations."""
+    """Minimise in place; returns energies, largest gradient, evaluations and whether it settled."""
     energy, wall_energy = _objective_kernel(
         state, work.gradient, network, walls, delta, contact, work.scratch
     )
@@ -285,7 +286,8 @@ def _minimise_kernel(
     looked, energy_then, calm = used, energy + wall_energy, False
     while used < max_evaluations:
         if used - looked >= WINDOW:
-            calm = energy_then - energy - wall_energy <= ftol * (energy + wall_energy)
+            scale = max(energy + wall_energy, SMALL_ENERGY * lever * lever * (state.size // 6))
+            calm = energy_then - energy - wall_energy <= ftol * scale
             looked, energy_then = used, energy + wall_energy
         small = _residual_gradient_kernel(state, work.gradient, lever) <= tolerance
         if (small and calm) if thorough else (small or calm):
@@ -303,12 +305,13 @@ def _minimise_kernel(
         used += trials
         if length == 0.0:
             if work.held[0] == 0:
+                calm = True
                 break  # as low as rounding allows
             work.held[0] = 0
             continue
         _keep_kernel(state, work)
         energy, wall_energy = new_energy, new_wall_energy
-    return energy, wall_energy, _residual_gradient_kernel(state, work.gradient, lever), used
+    return energy, wall_energy, _residual_gradient_kernel(state, work.gradient, lever), used, calm
 
 
 def _workplace(state: NDArray[Any]) -> _Work:
@@ -360,7 +363,7 @@ def minimise(
         kappa0 l0 times `orientation_lever(delta)`.
     ftol : float
         The state is left, though not converged, when `WINDOW` evaluations lower the energy by no
-        more than this part.
+        more than this part, or, where there is next to none, by this part of `SMALL_ENERGY`.
     thorough : bool
         Leave it only when both are met, or no step lowers the energy any more.
     contact : float
@@ -379,9 +382,9 @@ def minimise(
     lever = orientation_lever(delta)
     state[state.size // 2 :] *= lever
     work = _workplace(state)
-    energy, wall_energy, residual, used = _minimise_kernel(
+    energy, wall_energy, residual, used, settled = _minimise_kernel(
         state, network, walls, delta, contact, lever, tolerance * lever, ftol, thorough, max_evaluations, work
     )
     finite = math.isfinite(energy + wall_energy) and bool(np.isfinite(state).all())
-    converged = finite and residual <= tolerance * lever
+    converged = finite and residual <= tolerance * lever and (settled or not thorough)
     return Minimum(unit_orientations(state), energy, wall_energy, residual, used, converged, contact)

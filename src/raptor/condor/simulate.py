@@ -285,7 +285,8 @@ def _in_double_precision(minimum: Minimum, system: System, delta: float, contrac
         contact=minimum.contact,
         max_evaluations=contraction.max_evaluations,
     )
-    return found._replace(evaluations=minimum.evaluations + found.evaluations)
+    both = found.converged and minimum.converged
+    return found._replace(evaluations=minimum.evaluations + found.evaluations, converged=both)
 
 
 def _contact_energy(minimum: Minimum, system: System, delta: float) -> float:

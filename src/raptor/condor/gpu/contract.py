@@ -183,11 +183,18 @@ class BatchSolver:
         last = [len(self.targets[n]) - 1 == k for n, k in zip(progress.task, progress.step, strict=True)]
         goal.delta[rows] = torch.tensor(ahead, dtype=torch.float64, device=self.device)
         goal.contact[rows] = contact
-        thorough = np.array(last) & (self.accuracy.contraction.ftol >= 0)
-        goal.thorough = torch.where(mask, self._mask(thorough), goal.thorough)
         rules = self.accuracy.contraction
-        most = np.where(last, rules.max_evaluations, rules.step_evaluations)
-        goal.max_evaluations = torch.where(mask, torch.tensor(most, device=self.device), goal.max_evaluations)
+        for values, at_last, before in (
+            (goal.thorough, rules.last_ftol >= 0, False),
+            (goal.tolerance, rules.tolerance, 0.0),
+            (goal.ftol, rules.last_ftol, rules.ftol),
+            (goal.max_evaluations, rules.max_evaluations, rules.step_evaluations),
+        ):
+            values[rows] = torch.tensor(
+                [at_last if ends else before for ends, begins in zip(last, chosen, strict=True) if begins],
+                dtype=values.dtype,
+                device=self.device,
+            )
         shaken = chosen & (progress.phase == 0) & (goal.delta > 0).cpu().numpy()
         if self.accuracy.contraction.sweeps and shaken.any():
             self._agitate(shaken)

@@ -13,7 +13,7 @@ from torch import Tensor
 from raptor.condor.energy import SMALLEST_LEVER
 from raptor.condor.gpu.energy import objective, units
 from raptor.condor.gpu.layout import ROW, Batch, join
-from raptor.condor.minimise import BACKTRACKS, MAX_STEP, MAX_TURN, MEMORY, SUFFICIENT, WINDOW
+from raptor.condor.minimise import BACKTRACKS, MAX_STEP, MAX_TURN, MEMORY, SMALL_ENERGY, SUFFICIENT, WINDOW
 
 TINY = 1e-30
 PER_BLOCK = ("state", "gradient", "direction", "pairs")  # of a minimiser; its other tensors are per tissue
@@ -154,7 +154,8 @@ class Minimiser:
         """Which tissues have reached their goal, among those whose state has changed."""
         goal, total = self.goal, self.energy + self.wall_energy
         look = moved & (self.used - self.looked >= WINDOW)
-        calm = self.looked_at - total <= goal.ftol * total
+        small = SMALL_ENERGY * goal.lever**2 * self.batch.cells
+        calm = self.looked_at - total <= goal.ftol * torch.maximum(total, small)
         self.calm = torch.where(look, calm, self.calm)
         self.looked = torch.where(look, self.used, self.looked)
         self.looked_at = torch.where(look, total, self.looked_at)

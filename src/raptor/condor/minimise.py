@@ -31,13 +31,13 @@ from raptor.condor.walls import Walls
 from raptor.core.compiled import kernel
 from raptor.core.errors import RaptorError
 
-MEMORY = 5  # pairs of steps that the inverse Hessian is built from
+MEMORY = 6  # pairs of steps that the inverse Hessian is built from
 MAX_STEP = 0.15  # l0: the farthest that one step moves any coordinate of a cell
 MAX_TURN = 0.5  # radians, about: the farthest that one step turns it
 SUFFICIENT = 1e-4  # Armijo's constant
 BACKTRACKS = 12
 WINDOW = 25  # evaluations over which the fall of the energy is judged
-SMALL_ENERGY = 3e-3  # kappa0 l0^2 a cell, over Delta^2: falls of less energy are judged by this
+SMALL_ENERGY = 1e-2  # kappa0 l0^2 a cell, over Delta^2: falls of less energy are judged by this
 BLOCK = 1024  # numbers that are worked on at a time, so that they stay in the innermost cache
 
 

@@ -254,7 +254,7 @@ def main(
     found["design"] = asdict(time_design(tasks, of, cast_seconds, model, pixels, at))
     architecture = published(pixels, channels)
     precision = "bfloat16" if where == "cuda" else "float32"
-    training = TrainingRules(batch_size=batch_size, adversarial=1.0, precision=precision)
+    training = TrainingRules(batch_size=batch_size, lambda_l1=100.0, precision=precision)
     bonds, bonds_a_cell = gradient_rate(tasks, model, at)
     found["rates"] = {
         "bonds": bonds,

@@ -122,7 +122,7 @@ def main(
         table.add_column(head, justify="right")
     table.add_row("reading examples", f"{reading_rate(dataset, batch_size):.0f}")
     device, threads = chosen_device("auto"), torch.get_num_threads()
-    rules = TrainingRules(batch_size=batch_size, adversarial=1.0, threads=threads)
+    rules = TrainingRules(batch_size=batch_size, lambda_l1=100.0)
     rate = examples_a_second(published(pixels, channels), rules, device)
     place = "GPU" if device == "cuda" else f"{threads} threads"
     table.add_row(f"training, {channels} base channels, {place}", f"{rate:.1f}")

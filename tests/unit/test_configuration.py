@@ -127,7 +127,7 @@ def test_a_model_is_as_the_first_but_for_its_keys():
         ({"one": {}, "on": {"initial_weights": "one", "ensemble_size": 3}}, "on.ensemble_size is 3"),
         ({"one": {"campaigns": ["sweep"]}}, "sweep has no run to train on"),
         ({"one": {"campaigns": ["papers"]}}, "campaigns has 'papers'; allowed are paper"),
-        ({"one": {"adversarial": 1.0}, "on": {"initial_weights": "one"}}, "set adversarial: 0"),
+        ({"one": {"lambda_l1": 100.0}, "on": {"initial_weights": "one"}}, "set lambda_l1: null"),
     ],
 )
 def test_models_that_cannot_be_trained_are_named(models, message):

@@ -128,10 +128,10 @@ def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
 @pytest.fixture
 def training(made, tmp_path):
     stack = made / "fields.nc"
-    pix2pix = {"network": "pix2pix", "base_channels": 4, "adversarial": 1.0, "reconstruction_weight": 100.0}
+    pix2pix = {"network": "pix2pix", "base_channels": 4, "lambda_l1": 100.0}
 
     def run(epochs, name, identity="a", initial_weights=None, **changes):
-        rules = ModelRules(**pix2pix | {"epochs": epochs, "beta1": 0.5} | changes)
+        rules = ModelRules(**pix2pix | {"epochs": epochs} | changes)
         scaling, splits = training_scaling(stack), read_table(stack).split
         return train(
             *split_examples([stack], list_examples(stack), splits, scaling, 32), rules.architecture(32),
@@ -197,13 +197,13 @@ def test_a_split_without_examples_is_named(made):
 
 @pytest.mark.parametrize("network", ["pix2pix_film", "film_unet", "fno"])
 def test_other_networks_learn_without_a_discriminator(training, network):
-    trained = training(3, "other.pt", network=network, learning_rate=3e-3, adversarial=0.0)
+    trained = training(3, "other.pt", network=network, learning_rate=3e-3, lambda_l1=None)
     assert learnt(trained)
     assert (trained.history["discriminator_loss"] == 0).all()
 
 
 def test_a_sampler_starts_from_a_network_that_gives_a_mean(training):
-    plain = {"network": "film_unet", "adversarial": 0.0}
+    plain = {"network": "film_unet", "lambda_l1": None}
     mean = training(2, "mean.pt", **plain)
     weights = mean.generator.state_dict()
     started = training(1, "started.pt", "b", weights, noise=4, learning_rate=1e-12, **plain)

@@ -60,7 +60,7 @@ rule train_member:
     wildcard_constraints:
         model="|".join(MODELS) or "none",
     retries: 1
-    threads: lambda wildcards: MODELS[wildcards.model].threads
+    threads: 1
     resources:
         mem_mb=lambda wildcards, attempt: 5000 * attempt,
         runtime=lambda wildcards, attempt: 720 * attempt,

@@ -29,7 +29,7 @@ CAMPAIGNS = {
 }
 MODELS: dict[str, dict[str, Any]] = {
     "film_unet": {},
-    "pix2pix": {"network": "pix2pix", "adversarial": 1.0, "beta1": 0.5, "ensemble_size": 1},
+    "pix2pix": {"network": "pix2pix", "lambda_l1": 100.0, "ensemble_size": 1},
 }
 
 
@@ -155,8 +155,8 @@ class Configuration(Block):
                 f"models.{name}.ensemble_size is {model.ensemble_size}; its initial_weights has "
                 f"{initial.ensemble_size}"
             )
-        if model.adversarial:
-            raise ValueError(f"models.{name}.initial_weights: no discriminator is kept; set adversarial: 0")
+        if model.lambda_l1 is not None:
+            raise ValueError(f"models.{name}.initial_weights: no discriminator is kept; set lambda_l1: null")
         if model.campaigns[0] != initial.campaigns[0]:
             raise ValueError(f"models.{name}.campaigns: the first is not that of its initial_weights")
 

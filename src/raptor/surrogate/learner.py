@@ -15,6 +15,12 @@ from raptor.surrogate.rules import Architecture, TrainingRules
 SAMPLES = 2
 """Samples that a network with noise draws for every example in a step."""
 
+RECONSTRUCTION_WEIGHT = 1000.0
+"""Of the loss of a generator without a discriminator, whose scaled fields differ by some thousandths."""
+
+BETA1 = {"pix2pix": 0.5, "pix2pix_film": 0.5}
+"""Adam's first decay rate, as Isola et al. chose it (arXiv:1611.07004); of other networks 0.9."""
+
 LOSSES = ("generator_loss", "reconstruction_loss", "discriminator_loss")
 
 
@@ -39,15 +45,16 @@ class Learner:
         self.rules, self.scaling = rules, scaling
         self.generator = Generator(architecture, scaling)
         networks: dict[str, nn.Module] = {"generator": self.generator}
-        if rules.adversarial:
+        if rules.lambda_l1 is not None:
             networks["discriminator"] = Discriminator(architecture.pixels, architecture.base_channels)
         # Tensor cores need channels last for convolutions.
         layout = torch.channels_last if device.type == "cuda" else torch.contiguous_format
         for network in networks.values():
             network.to(device=device, memory_format=layout)  # type: ignore[call-overload]
         self.networks = networks
+        beta1 = BETA1.get(architecture.network, 0.9)
         self.optimisers = {
-            name: torch.optim.Adam(network.parameters(), rules.learning_rate, (rules.beta1, 0.999))
+            name: torch.optim.Adam(network.parameters(), rules.learning_rate, (beta1, 0.999))
             for name, network in networks.items()
         }
 
@@ -70,7 +77,7 @@ class Learner:
         else:
             prediction = self._evaluate("generator", inputs, cells)
             reconstruction = reconstruction_loss(prediction, target, signed="discriminator" in self.networks)
-        total = self.rules.reconstruction_weight * reconstruction
+        total = (self.rules.lambda_l1 or RECONSTRUCTION_WEIGHT) * reconstruction
         adversary = torch.zeros((), device=inputs.device)
         if "discriminator" in self.networks:
             logits = [
@@ -80,7 +87,7 @@ class Learner:
             self._descend("discriminator", adversary)
             self.networks["discriminator"].requires_grad_(False)
             opinion = self._evaluate("discriminator", inputs, prediction)
-            total = total + self.rules.adversarial * adversarial_loss(opinion)
+            total = total + adversarial_loss(opinion)
         self._descend("generator", total)
         if "discriminator" in self.networks:
             self.networks["discriminator"].requires_grad_(True)

@@ -39,27 +39,23 @@ class Architecture(Block):
 class TrainingRules(Block):
     """How a network is trained.
 
-    pix2pix uses a learning rate of 2e-4, beta1 of 0.5, a weight of 100 on the L1 distance and a
-    discriminator. On a few dozen moulds the defaults did better on the validation split.
+    pix2pix uses a learning rate of 2e-4 and a discriminator, beside which the L1 distance weighs 100. On a
+    few dozen moulds the defaults did better on the validation split.
     """
 
-    adversarial: float = Field(
-        0.0, ge=0, description="weight of the discriminator's loss; 0: train without one (pix2pix: 1)"
-    )
-    reconstruction_weight: float = Field(
-        1000.0, ge=0, description="weight of the mean absolute error of scaled fields (pix2pix: 100)"
+    lambda_l1: float | None = Field(
+        None,
+        gt=0,
+        description="weight of the L1 distance beside the loss of a discriminator (pix2pix: 100); "
+        "null: train without one",
     )
     epochs: Positive = Field(70, description="passes over the augmented examples")
     batch_size: int = Field(4, ge=2, description="examples per step")
     learning_rate: float = Field(
         1e-3, gt=0, lt=1, description="of Adam; falls linearly to zero over the second half (pix2pix: 2e-4)"
     )
-    beta1: float = Field(0.9, ge=0, lt=1, description="of Adam (pix2pix: 0.5)")
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of the layers in training; weights, losses and steps are float32"
-    )
-    threads: Positive = Field(
-        1, description="processor threads; trained weights are equal for an equal number"
     )
 
 

@@ -58,7 +58,7 @@ def train(
     Parameters
     ----------
     seed : int
-        Of initial weights, order of examples and dropout. Weights are equal for equal seeds and threads.
+        Of initial weights, order of examples and dropout. Equal seeds give equal weights.
     identity : str
         Hash of everything that the training depends on; a checkpoint with another hash is ignored.
     initial_weights : mapping of str to Tensor, optional
@@ -70,7 +70,7 @@ def train(
     RaptorError
         If a loss is no longer finite.
     """
-    place = _prepare(rules.threads, device)
+    place = _prepare(device)
     keep_if_they_fit([training, validation], place)
     learner = Learner(architecture, training.scaling, rules, seed % 2**63, place)
     if initial_weights is not None:
@@ -91,9 +91,9 @@ def train(
     return Trained(generator.eval(), pd.DataFrame(history))
 
 
-def _prepare(threads: int, device: str) -> torch.device:
-    """Set threads and deterministic operations, where torch has them."""
-    torch.set_num_threads(threads)
+def _prepare(device: str) -> torch.device:
+    """Set one thread, which weights depend on, and deterministic operations, where torch has them."""
+    torch.set_num_threads(1)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # needed for reproducible cuBLAS
     torch.use_deterministic_algorithms(True, warn_only=True)
     torch.backends.cudnn.benchmark = False

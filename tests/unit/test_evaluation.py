@@ -1,5 +1,6 @@
 """Bands hold their share, flags fire, and the noise floor is what it says."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -98,6 +99,19 @@ def test_a_point_of_the_training_set_is_near_it_and_another_is_not():
     training = TrainingSet(points, 2.0)
     assert training.distance(points[3].astype(np.float64)) == pytest.approx(0, abs=1e-6)
     assert training.distance(np.full(9, 6.0)) > 3
+
+
+def test_what_is_unusual_is_named_with_its_value_and_the_range_that_was_trained_on():
+    usual = dict.fromkeys(DESCRIPTORS, 0.5) | {"tethers": 2.0, "longest_tether": 10.0}
+    points = np.array(list(usual.values())) + np.linspace(-0.4, 0.4, 41)[:, None]
+    training = TrainingSet(points.astype(np.float32))
+    point = np.array(list((usual | {"longest_tether": 24.0}).values()))
+    assert training.unusual(point) == "longest tether 24 l0; trained on 9.6 to 10.4 l0"
+    point = np.array(list((usual | {"tethers": 3.0}).values()))
+    assert training.unusual(point) == "number of tethers 9; trained on 3 to 6"
+    point = np.array(list((usual | {"delta": 0.85}).values()))
+    told = training.unusual(point)
+    assert re.fullmatch(r"Delta 0.815 with all else as it is; the nearest .* has 0\.\d+", told)
 
 
 def test_the_threshold_of_softer_images_is_found():

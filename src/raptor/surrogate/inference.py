@@ -150,6 +150,7 @@ class Surrogate:
         cast, calibration = self.cast(mould), self.calibration
         found = self.ensemble(cast, parameters)
         ratios = np.array([self.ratios(density, cast) for density in found.densities])
+        point = descriptors(cast.depression, cast.tethers, parameters)
         return Prediction(
             cast,
             parameters,
@@ -158,8 +159,9 @@ class Surrogate:
             calibration.fields.bands(found.deviation, np.abs(found.mean[:1])),
             calibration.ratios.bands(deviation(ratios), np.ones(2)),
             calibration.relative_disagreement(found.deviation, found.mean),
-            calibration.training.distance(descriptors(cast.depression, cast.tethers, parameters)),
+            calibration.training.distance(point),
             self.threshold,
+            calibration.training.unusual(point),
         )
 
     def ensemble(self, mould: Mould | CastMould, parameters: CellParameters) -> Ensemble:

@@ -1,7 +1,9 @@
-"""Distance of a mould and its parameters from the training set."""
+"""Distance of a mould and its parameters from the training set, and what is unusual about them."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +11,36 @@ from scipy.ndimage import find_objects, label
 from scipy.spatial import KDTree
 
 from raptor.frame import pixel_size
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters
 
-DESCRIPTORS = (
-    "delta", "kappa_nnn", "kappa_nnnn", "area", "length", "slenderness", "tethers", "tether_area",
-    "longest_tether",
-)  # fmt: skip
+
+class Descriptor(NamedTuple):
+    """What a descriptor is called, its unit, and the quantity that it stands for."""
+
+    words: str
+    unit: str
+    quantity: Callable[[float], float]
+
+    def text(self, value: float) -> str:
+        """A value of the descriptor in words."""
+        return f"{self.quantity(value):.3g} {self.unit}".rstrip()
+
+
+def _scaled_back(bounds: Bounds) -> Callable[[float], float]:
+    return lambda value: bounds.lower + value * (bounds.upper - bounds.lower)
+
+
+DESCRIPTORS = {
+    "delta": Descriptor("Delta", "", _scaled_back(DELTA)),
+    "kappa_nnn": Descriptor("kappa_nnn", "", _scaled_back(KAPPA_NNN)),
+    "kappa_nnnn": Descriptor("kappa_nnnn", "", _scaled_back(KAPPA_NNNN)),
+    "area": Descriptor("area", "l0^2", lambda side: side**2),
+    "length": Descriptor("length", "l0", lambda length: length),
+    "slenderness": Descriptor("ratio of length to width", "", math.exp),
+    "tethers": Descriptor("number of tethers", "", lambda root: round(root**2)),
+    "tether_area": Descriptor("area of all tethers", "l0^2", lambda side: side**2),
+    "longest_tether": Descriptor("longest tether", "l0", lambda length: length),
+}
 
 
 def descriptors(
@@ -23,8 +49,8 @@ def descriptors(
     """Descriptors (`DESCRIPTORS`,) of a mould (masks (y, x)) and its parameters.
 
     They are invariant under rotation and reflection. Parameters are over the width of their range, lengths
-    in l0, areas as the side of a square; slenderness is the logarithm of the ratio of the depression's
-    principal axes.
+    in l0, areas as the side of a square, numbers as their root; slenderness is the logarithm of the ratio of
+    the depression's principal axes, length four standard deviations along the longer.
     """
     size = pixel_size(depression.shape[-1])
     short, long = _principal_axes(depression, size)
@@ -78,3 +104,24 @@ class TrainingSet:
         deviation = self.points.std(axis=0) + 1e-6
         nearest, _ = KDTree(self.points / deviation).query(point / deviation)
         return float(nearest) / self.usual
+
+    def unusual(self, point: NDArray[np.float64]) -> str:
+        """The descriptor that is farthest out of the range that was trained on, its value and that range.
+
+        Where each lies within its range, the one that differs most from the nearest training sample's.
+        """
+        deviation = self.points.std(axis=0) + 1e-6
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        excess = np.maximum(low - point, point - high) / deviation
+        number = int(excess.argmax())
+        if excess[number] > 0:
+            found = tuple(DESCRIPTORS.values())[number]
+            lowest = found.text(low[number]).removesuffix(f" {found.unit}")
+            return f"{found.words} {found.text(point[number])}; trained on {lowest} to {found.text(high[number])}"
+        _, nearest = KDTree(self.points / deviation).query(point / deviation)
+        number = int((np.abs(self.points[nearest] - point) / deviation).argmax())
+        found = tuple(DESCRIPTORS.values())[number]
+        return (
+            f"{found.words} {found.text(point[number])} with all else as it is; the nearest training sample "
+            f"has {found.text(self.points[nearest, number])}"
+        )

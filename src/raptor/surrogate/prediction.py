@@ -44,6 +44,8 @@ class Prediction:
         From the input to the nearest of the training set, likewise.
     threshold : float
         Density per pixel above which there is tissue in these fields.
+    most_unusual : str
+        The descriptor of the input that is least like the training set's, with its value and their range.
     """
 
     cast: CastMould
@@ -55,6 +57,7 @@ class Prediction:
     disagreement: float
     distance: float
     threshold: float
+    most_unusual: str
 
     @property
     def mould(self) -> Mould:
@@ -112,7 +115,16 @@ class Prediction:
 
         The bands are then meaningless: simulate instead.
         """
-        return bool(max(self.disagreement, self.distance) > 1)
+        return bool(self.unusual)
+
+    @property
+    def unusual(self) -> str:
+        """Why the prediction is out of distribution, in words; empty where it is not."""
+        if self.distance > 1:
+            return self.most_unusual
+        if self.disagreement > 1:
+            return f"the networks disagree {self.disagreement:.1f} times as much as is usual"
+        return ""
 
     @property
     def fields(self) -> "xr.Dataset":
@@ -140,6 +152,7 @@ class Prediction:
             "posts_lost": self.posts_lost, "alignment": self.alignment, "anisotropy": self.anisotropy,
             "held": self.held.tolist(),
             "distance": self.distance, "disagreement": self.disagreement, "unlike": self.out_of_distribution,
+            "unusual": self.unusual,
         }  # fmt: skip
 
     def to_dataset(self) -> "xr.Dataset":
@@ -166,8 +179,8 @@ class Prediction:
         )
         if self.out_of_distribution:
             said += (
-                "\nunlike the training set, so do not trust these bands; simulate instead: "
-                f"distance {self.distance:.1f}, disagreement {self.disagreement:.1f} (usual: below 1)"
+                f"\nunusual: {self.unusual}\n"
+                "The surrogate was not trained on such a tissue. Do not trust these bands; simulate instead."
             )
         return said
 

@@ -132,10 +132,28 @@ def test_a_result_is_saved_drawn_and_read_again(kind, request, tmp_path):
     assert mould_of(fields) == result.mould
     assert fields.density.dtype == np.float32
     assert np.allclose(fields.density, result.to_dataset().density, atol=1e-6)
-    figures = [raptor.plot(what) for what in (result, fields)]
+    figures = [raptor.plot(what, fields=True) for what in (result, fields)]
     images = [figure.axes[1].images[0].get_array() for figure in figures]
     assert np.allclose(*images, atol=1e-6)
     assert figures[0].axes[1].get_ylabel() == ("simulation" if kind == "tissue" else "prediction")
+
+
+@pytest.mark.parametrize("kind", ["tissue", "prediction"])
+def test_the_picture_of_a_tissue_says_its_numbers_and_marks_lost_tethers(kind, request):
+    fields = request.getfixturevalue(kind).to_dataset()
+    said = texts(fields)
+    assert f"{float(fields.area_ratio):.3f}" in said
+    assert (" $\\pm$ " in said) == (kind == "prediction")
+    count = fields.held.size
+    assert f"{count} of {count} held" in said
+    lost = fields.assign_coords(held=("tether", [0.0] + [1.0] * (count - 1)))
+    assert f"{count - 1} of {count} held; lost: 1" in texts(lost)
+    assert "unusual" in texts(fields.assign_attrs(unusual="longest tether 24 l0"))
+
+
+def texts(fields):
+    """All that the picture of a tissue says."""
+    return " ".join(text.get_text() for axes in raptor.plot(fields).axes for text in axes.texts)
 
 
 def test_a_mould_is_drawn_and_a_notebook_shows_it():

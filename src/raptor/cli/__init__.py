@@ -12,6 +12,7 @@ from raptor.cli.draw import draw
 from raptor.cli.fit import fit
 from raptor.cli.library import moulds, tissues
 from raptor.cli.measure import measure
+from raptor.cli.plot import plot
 from raptor.cli.predict import predict
 from raptor.cli.simulate import simulate
 from raptor.core.errors import RaptorError
@@ -26,7 +27,8 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, simulate, predict, fit, measure, check, trace, same, progress, well, reference,
+    moulds, tissues, draw, simulate, predict, plot, fit, measure, check, trace, same, progress, well,
+    reference,
 )  # fmt: skip
 
 

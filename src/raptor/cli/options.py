@@ -49,7 +49,8 @@ Surrogate = Annotated[
     typer.Option(help="folder with weights.safetensors and model.json, instead of the shipped surrogate"),
 ]
 Output = Annotated[Path, typer.Option(help="netCDF file to write")]
-Picture = Annotated[Path | None, typer.Option(help="picture of the eight fields to write (PNG or SVG)")]
+Picture = Annotated[Path | None, typer.Option(help="picture of the tissue to write (PNG, SVG or PDF)")]
+Fields = Annotated[bool, typer.Option("--fields", help="draw the eight fields in the picture")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
 Layers = Annotated[int, typer.Option(help="cell layers between floor and fill height")]
 
@@ -123,18 +124,18 @@ def require_picture_writable(picture: Path | None, *others: Path | None) -> None
         require_writable(picture, *others, kind="a picture")
 
 
-def save_picture(what: Any, picture: Path | None) -> None:
+def save_picture(what: Any, picture: Path | None, fields: bool = False) -> None:
     """Write what `raptor.plot` draws, if a picture is requested."""
     if picture is not None:
         from raptor.plotting import save_picture
 
-        save_picture(raptor.plot(what), picture)
+        save_picture(raptor.plot(what, fields=fields), picture)
 
 
-def finish(result: "Result", output: Path, picture: Path | None, as_json: bool) -> None:
+def finish(result: "Result", output: Path, picture: Path | None, fields: bool, as_json: bool) -> None:
     """Write a tissue or a prediction and its picture, and print a summary."""
     raptor.save(result, output)
-    save_picture(result, picture)
+    save_picture(result, picture, fields)
     numbers = result.numbers | {"mm_per_l0": result.mould.mm_per_l0, "output": output, "picture": picture}
     report(f"{output}: {result}", numbers, as_json)
 

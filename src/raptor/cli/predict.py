@@ -17,6 +17,7 @@ def predict(
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
     picture: opt.Picture = None,
+    fields: opt.Fields = False,
     as_json: opt.Json = False,
 ) -> None:
     """Predict the tissue of a mould by a trained surrogate, with 50, 80 and 95 % bands.
@@ -32,4 +33,4 @@ def predict(
     shape = opt.read_mould(mould, scale, mm_per_l0, page)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
-    opt.finish(raptor.predict(shape, cells, model), output, picture, as_json)
+    opt.finish(raptor.predict(shape, cells, model), output, picture, fields, as_json)

@@ -23,6 +23,7 @@ def simulate(
     accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="seed of every random number")] = 0,
     picture: opt.Picture = None,
+    fields: opt.Fields = False,
     as_json: opt.Json = False,
 ) -> None:
     """Simulate the tissue of a mould with CONDOR.
@@ -40,4 +41,4 @@ def simulate(
     shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
-    opt.finish(raptor.simulate(shape, cells, layers, accuracy, seed), output, picture, as_json)
+    opt.finish(raptor.simulate(shape, cells, layers, accuracy, seed), output, picture, fields, as_json)

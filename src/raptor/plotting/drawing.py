@@ -43,7 +43,11 @@ STYLE: dict[Any, Any] = {
 }  # fmt: skip
 STYLED = mpl.rc_context(STYLE)
 """Decorator of a drawing function: draw in the style of this package."""
-METADATA: dict[str, dict[str, None]] = {".png": {"Software": None}, ".svg": {"Date": None}}
+METADATA: dict[str, dict[str, None]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
 """Suffixes of pictures, and metadata omitted so that the same data give the same bytes."""
 HALF = IMAGE_SIZE / 2
 
@@ -65,12 +69,12 @@ def new_figure(width: float, height: float) -> Figure:
 
 def save(figure: Figure, stem: Path) -> None:
     """Write a figure as PNG and SVG, the same bytes for the same data."""
-    for suffix in METADATA:
+    for suffix in (".png", ".svg"):
         save_picture(figure, stem.with_name(stem.name + suffix))
 
 
 def save_picture(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG or SVG, by its suffix, the same bytes for the same data.
+    """Write a figure as PNG, SVG or PDF, by its suffix, the same bytes for the same data.
 
     Raises
     ------

@@ -7,12 +7,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from raptor.core.errors import RaptorError
+from raptor.dataset.result import load_fields
 from raptor.fields.labelled import mould_of
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import read_mould
 from raptor.moulds.summary import summarise
 from raptor.plotting.drawing import fields_figure, mould_figure
 from raptor.plotting.fits import PARAMETER_LABELS, fit_figure
+from raptor.plotting.tissue import tissue_figure
 from raptor.symmetry import FIELDS
 
 if TYPE_CHECKING:
@@ -21,13 +23,15 @@ if TYPE_CHECKING:
 NUMBERS = PARAMETER_LABELS | {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
 
 
-def plot(what: Any) -> Figure:
+def plot(what: Any, *, fields: bool = False) -> Figure:
     """Draw a mould, a simulated or a predicted tissue, its fields, a fit, or a measured photograph.
 
     Parameters
     ----------
     what : Mould, Tissue, Prediction, Dataset of fields, FittedTissue, MeasuredPhotograph, str or Path
-        A string or a path is a mould: a library name or a file.
+        A string or a path is a mould (a library name or a file), or a netCDF file of a tissue.
+    fields : bool
+        Draw the eight fields of a tissue, instead of density, directors, tethers and numbers.
 
     Returns
     -------
@@ -40,7 +44,7 @@ def plot(what: Any) -> Figure:
         If objects of this type cannot be drawn.
     """
     if isinstance(what, (str, Path)):
-        what = read_mould(what)
+        what = load_fields(what) if Path(what).suffix == ".nc" else read_mould(what)
     if isinstance(what, Mould):
         return mould_figure(what, summarise(what).rows)
     if hasattr(what, "density") and hasattr(what, "by"):
@@ -52,7 +56,7 @@ def plot(what: Any) -> Figure:
     if hasattr(what, "to_dataset"):
         what = what.to_dataset()
     if hasattr(what, "data_vars"):
-        return draw_fields(what)
+        return draw_fields(what) if fields else tissue_figure(what)
     raise RaptorError(
         f"cannot draw an object of type {type(what).__name__}; give a mould, a tissue or its fields"
     )

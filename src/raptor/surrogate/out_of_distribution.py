@@ -117,7 +117,8 @@ class TrainingSet:
         if excess[number] > 0:
             found = tuple(DESCRIPTORS.values())[number]
             lowest = found.text(low[number]).removesuffix(f" {found.unit}")
-            return f"{found.words} {found.text(point[number])}; trained on {lowest} to {found.text(high[number])}"
+            trained_on = f"{lowest} to {found.text(high[number])}"
+            return f"{found.words} {found.text(point[number])}; trained on {trained_on}"
         _, nearest = KDTree(self.points / deviation).query(point / deviation)
         number = int((np.abs(self.points[nearest] - point) / deviation).argmax())
         found = tuple(DESCRIPTORS.values())[number]

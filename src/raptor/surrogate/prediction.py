@@ -169,7 +169,8 @@ class Prediction:
             f"{name}_std": (("y", "x"), image, named(f"standard deviation of the error of {name}, per pixel"))
             for name, image in zip(fields, self.deviation, strict=True)
         }
-        return fields.assign_coords(added).assign(deviations)
+        about = {"unusual": self.unusual} if self.out_of_distribution else {}
+        return fields.assign_coords(added).assign(deviations).assign_attrs(about)
 
     def __str__(self) -> str:
         half = self.ratio_bands.half[-1]

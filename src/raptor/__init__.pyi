@@ -12,6 +12,7 @@ from .moulds.library.tissues import MeasuredTissue, tissue
 from .moulds.reading import read_mould
 from .parameters import CellParameters, NetworkModel
 from .plotting.front import plot
+from .studies.curve import sweep
 from .surrogate.command import load_surrogate, predict
 from .surrogate.inference import Surrogate
 from .surrogate.prediction import Prediction
@@ -39,5 +40,6 @@ __all__ = [
     "read_mould",
     "save",
     "simulate",
+    "sweep",
     "tissue",
 ]

@@ -376,3 +376,11 @@ def test_a_full_disk_stops_a_simulation_with_one_sentence(tmp_path):
     assert done.returncode != 0
     assert done.stderr.startswith("error: no room left on the disk")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("text", ["0.1:x", "0.1:0.9", "0.1:0.9:1", "much"])
+def test_a_range_that_cannot_be_read_is_named_before_any_work(tmp_path, text):
+    done = raptor("sweep", "small_rectangle", "--delta", text, "--output", tmp_path / "curve.csv")
+    assert done.returncode == 1
+    assert f"--delta is '{text}'; give a number, or START:STOP:COUNT" in done.stderr
+    assert not list(tmp_path.iterdir())

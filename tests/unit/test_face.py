@@ -13,6 +13,7 @@ import xarray as xr
 import raptor
 from raptor.dataset.check import check
 from raptor.fields.labelled import mould_of
+from raptor.plotting import curve_figure
 from raptor.symmetry import FIELDS
 
 ROOT = Path(__file__).parents[2]
@@ -149,6 +150,19 @@ def test_the_picture_of_a_tissue_says_its_numbers_and_marks_lost_tethers(kind, r
     lost = fields.assign_coords(held=("tether", [0.0] + [1.0] * (count - 1)))
     assert f"{count - 1} of {count} held; lost: 1" in texts(lost)
     assert "unusual" in texts(fields.assign_attrs(unusual="longest tether 24 l0"))
+
+
+def test_a_curve_of_a_mould_is_predicted_and_simulated(tmp_path):
+    cells = [raptor.CellParameters(delta, 0.5, 0.25) for delta in (0.2, 0.6)]
+    table = raptor.sweep("small_rectangle", cells, simulations=2)
+    assert table["delta"].tolist() == [0.2, 0.6]
+    for name in ("area_ratio", "simulated_area_ratio", "width_ratio", "simulated_width_ratio"):
+        assert table[name].is_monotonic_decreasing
+    assert (table["simulated_area_ratio_std"] < 0.1).all()
+    axes = curve_figure(table, "small_rectangle").axes
+    assert np.allclose(axes[0].lines[0].get_xydata(), table[["delta", "area_ratio"]])
+    with pytest.raises(raptor.RaptorError, match="delta"):
+        raptor.sweep("small_rectangle", [raptor.CellParameters(0.97, 0.5, 0.25)])
 
 
 def texts(fields):

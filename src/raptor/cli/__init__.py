@@ -15,6 +15,7 @@ from raptor.cli.measure import measure
 from raptor.cli.plot import plot
 from raptor.cli.predict import predict
 from raptor.cli.simulate import simulate
+from raptor.cli.sweep import sweep
 from raptor.core.errors import RaptorError
 
 HELP = """Rapid prediction of tissue organisation: CONDOR simulations and their surrogate.
@@ -27,7 +28,7 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, simulate, predict, plot, fit, measure, check, trace, same, progress, well,
+    moulds, tissues, draw, simulate, predict, plot, sweep, fit, measure, check, trace, same, progress, well,
     reference,
 )  # fmt: skip
 

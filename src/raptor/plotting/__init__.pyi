@@ -1,4 +1,5 @@
 # What the room gives, and where each name lives; `plot` is the front door.
+from .curve import curve_figure
 from .drawing import (
     bulk_figure,
     design_figure,
@@ -30,6 +31,7 @@ __all__ = [
     "bulk_figure",
     "calibration_figure",
     "contraction_figure",
+    "curve_figure",
     "design_figure",
     "directors_figure",
     "draw_mould",

@@ -310,18 +310,32 @@ def test_the_wells_layout_holds_the_same_fields(made, tmp_path):
             fields = dict(zip(FIELDS, sample.fields, strict=True))
             assert file["scalars/delta"][row] == pytest.approx(sample.parameters.delta)
             assert np.array_equal(file["t0_fields/density"][row, 0], fields["density"].T)
-            assert np.array_equal(file["t0_fields/tethers"][row, 0], sample.tethers.T)
+            assert np.array_equal(file["t0_fields/tethers"][row], sample.tethers.T)
             assert np.array_equal(file["t1_fields/out_of_plane"][row, 0, ..., 1], fields["sysz"].T)
             tensor = file["t2_fields/orientation"][row, 0]
             assert np.array_equal(tensor[..., 0, 1], fields["sxsy"].T)
             assert np.array_equal(tensor[..., 1, 1], fields["sysy"].T)
             trace = tensor[..., 0, 0] + tensor[..., 1, 1] + file["t0_fields/szsz"][row, 0]
             assert trace == pytest.approx(file["t0_fields/density"][row, 0], abs=1e-5)
+        # What scripts/check_thewell_formatting.py and check_thewell_data.py of The Well ask for:
+        sizes = {"time": 1, "x": table.pixels, "y": table.pixels}
+        assert file["dimensions/time"].attrs["time_varying"]
+        for name in file.attrs["simulation_parameters"]:
+            values = file["scalars"][name][:]
+            assert file.attrs[name] == pytest.approx([values.min(), values.max()])
+        for name, boundary in file["boundary_conditions"].items():
+            (axis,) = boundary.attrs["associated_dims"]
+            assert name == f"{axis}_{boundary.attrs['bc_type'].lower()}"
+            assert boundary.attrs["bc_type"] == "OPEN"
+            assert boundary["mask"].shape == (sizes[axis],)
         for order in (0, 1, 2):
             group = file[f"t{order}_fields"]
             assert sorted(group.attrs["field_names"]) == sorted(group)
             for field in group.values():
-                assert {"dim_varying", "sample_varying", "time_varying"} <= set(field.attrs)
+                assert list(field.attrs["dim_varying"]) == [True, True]
+                assert field.attrs["sample_varying"]
+                time = (1,) if field.attrs["time_varying"] else ()
+                assert field.shape == (len(rows), *time, table.pixels, table.pixels, *(2,) * order)
 
 
 def test_a_part_of_the_simulations_is_computed_again(folder):

@@ -1,9 +1,10 @@
 """Export of field stacks to the HDF5 layout of The Well.
 
-R. Ohana et al., The Well (2024), arXiv:2412.00568; layout: docs/data_format.md of its repository. One
-file per split; a simulation is a trajectory of one time step. Axes are (trajectory, time, x, y), where ours
-are [y, x]. In the plane the orientation products form a tensor (sxsx, sxsy, sysy), a vector (sxsz, sysz)
-and a scalar (szsz).
+R. Ohana et al., The Well (2024), arXiv:2412.00568; layout: docs/data_format.md and
+scripts/check_thewell_formatting.py of its repository. One file per split; a simulation is a trajectory of
+one time step. Axes are (trajectory, time, x, y), where ours are [y, x]; the masks of the mould do not depend
+on time. In the plane the orientation products form a tensor (sxsx, sxsy, sysy), a vector (sxsz, sysz) and a
+scalar (szsz).
 """
 
 from collections.abc import Iterable
@@ -22,7 +23,8 @@ from raptor.parameters import PARAMETERS
 from raptor.symmetry import FIELDS
 
 FOLDERS = {"train": "train", "validation": "valid", "test": "test"}
-SCALARS = ("density", "tension", "szsz", "depression", "tethers")
+SCALARS = ("density", "tension", "szsz")
+MASKS = ("depression", "tethers")
 VECTOR = ("sxsz", "sysz")
 TENSOR = ("sxsx", "sxsy", "sxsy", "sysy")
 
@@ -45,7 +47,7 @@ def write_well(stack: Path, folder: Path) -> list[Path]:
         written[-1].parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(written[-1]) as temporary, h5py.File(temporary, "w") as file:
             _describe(file, len(rows), table.pixels)
-            _write_scalars(file, [table.parameters[row] for row in rows])
+            _write_parameters(file, [table.parameters[row] for row in rows])
             _write_fields(file, stack, rows, table.pixels)
     return written
 
@@ -63,24 +65,26 @@ def _describe(file: h5py.File, samples: int, pixels: int) -> None:
     )
     dimensions = file.create_group("dimensions")
     dimensions.attrs["spatial_dims"] = ["x", "y"]
-    _add(dimensions, "time", np.zeros(1), sample_varying=False)
+    _add(dimensions, "time", np.zeros(1), sample_varying=False, time_varying=True)
     boundaries = file.create_group("boundary_conditions")
     for axis in ("x", "y"):
         _add(dimensions, axis, pixel_centres(pixels), sample_varying=False, time_varying=False)
         boundary = boundaries.create_group(f"{axis}_open")
-        boundary.attrs.update({"associated_dims": [axis], "associated_fields": [], "bc_type": "open"})
+        boundary.attrs.update({"associated_dims": [axis], "associated_fields": [], "bc_type": "OPEN"})
         boundary.attrs.update({"sample_varying": False, "time_varying": False})
         boundary["mask"] = np.isin(np.arange(pixels), (0, pixels - 1))
         boundary["values"] = np.zeros(2, np.float32)
 
 
-def _write_scalars(file: h5py.File, parameters: Iterable[Any]) -> None:
+def _write_parameters(file: h5py.File, parameters: Iterable[Any]) -> None:
+    """Parameters of each trajectory as scalars; their range as the root attributes that a reader expects."""
     group = file.create_group("scalars")
     group.attrs["field_names"] = list(PARAMETERS)
     parameters = list(parameters)
     for name in PARAMETERS:
         values = np.array([getattr(p, name) for p in parameters])
         _add(group, name, values, sample_varying=True, time_varying=False)
+        file.attrs[name] = [values.min(), values.max()]
 
 
 def _write_fields(file: h5py.File, stack: Path, rows: list[int], pixels: int) -> None:
@@ -88,6 +92,7 @@ def _write_fields(file: h5py.File, stack: Path, rows: list[int], pixels: int) ->
     shape = (len(rows), 1, pixels, pixels)
     groups = [file.create_group(f"t{order}_fields") for order in (0, 1, 2)]
     made = {name: _field(groups[0], name, shape) for name in SCALARS}
+    made |= {name: _field(groups[0], name, (len(rows), pixels, pixels), False) for name in MASKS}
     made["out_of_plane"] = _field(groups[1], "out_of_plane", (*shape, 2))
     made["orientation"] = _field(groups[2], "orientation", (*shape, 2, 2))
     made["orientation"].attrs.update({"symmetric": True, "antisymmetric": False})
@@ -98,15 +103,17 @@ def _write_fields(file: h5py.File, stack: Path, rows: list[int], pixels: int) ->
         images |= {"depression": sample.depression.T, "tethers": sample.tethers.T}
         for name in SCALARS:
             made[name][row, 0] = images[name]
+        for name in MASKS:
+            made[name][row] = images[name]
         made["out_of_plane"][row, 0] = np.stack([images[name] for name in VECTOR], axis=-1)
         tensor = np.stack([images[name] for name in TENSOR], axis=-1)
         made["orientation"][row, 0] = tensor.reshape(pixels, pixels, 2, 2)
 
 
-def _field(group: h5py.Group, name: str, shape: tuple[int, ...]) -> h5py.Dataset:
+def _field(group: h5py.Group, name: str, shape: tuple[int, ...], time_varying: bool = True) -> h5py.Dataset:
     chunks = (1, *shape[1:])
     field = group.create_dataset(name, shape, "f4", chunks=chunks, compression="gzip", shuffle=True)
-    field.attrs.update({"dim_varying": [True, True], "sample_varying": True, "time_varying": True})
+    field.attrs.update({"dim_varying": [True, True], "sample_varying": True, "time_varying": time_varying})
     return field
 
 

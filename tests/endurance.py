@@ -125,7 +125,7 @@ def truncate_shard(trial: Trial, moment: random.Random) -> str:
     shard.unlink()
     return (
         f"{shard.name} cut to half: exit {status}, said '{said.group(1) if said else 'nothing clear'}'; "
-        f"after its deletion, the same command: exit {trial.finish()}"
+        f"after it was moved away, the same command: exit {trial.finish()}"
     )
 
 

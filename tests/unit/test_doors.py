@@ -1,7 +1,9 @@
 """Files as people have them: drawings, pictures and tables of many programs (tests/data/doors)."""
 
+import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import netCDF4
@@ -12,10 +14,13 @@ import yaml
 from PIL import Image
 
 import raptor
+from raptor.core.blocks import read_yaml
 from raptor.core.errors import RaptorError
+from raptor.core.files import read_input, read_json
 from raptor.core.pixels import TURNS, read_pixels
 from raptor.dataset.design import read_design
-from raptor.dataset.netcdf import open_file
+from raptor.dataset.netcdf import create, open_file
+from raptor.dataset.shards import read_shard
 from raptor.imaging import measure, read_picture, register
 from raptor.moulds import Circle, read_mould
 from raptor.moulds.cast import cast_sites
@@ -183,3 +188,33 @@ def test_a_locked_file_is_not_called_damaged(tmp_path):
         writer.communicate("\n")
     with open_file(path) as file:
         assert list(file.dimensions) == ["x"]
+
+
+def test_a_forbidden_file_keeps_its_cause(tmp_path, monkeypatch):
+    """Root may read everything, so the system's answer is put in its place."""
+    path = tmp_path / "model.json"
+    path.write_text("{}")
+
+    def forbidden(self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", forbidden)
+    for read in (read_json, partial(read_input, what="mould", expected="a mould"), read_yaml):
+        with pytest.raises(RaptorError, match=r"(may not be read|Permission denied)") as caught:
+            read(path)
+        assert isinstance(caught.value.__cause__, PermissionError)
+
+
+def test_nobody_is_told_to_delete_data():
+    """Files of the user's may be locked, forbidden or wanted; a drawing's parts are another matter."""
+    rooms = ("core", "dataset", "surrogate", "studies", "fitting", "imaging", "cli", "config")
+    package = Path(raptor.__file__).parent
+    for source in (path for room in rooms for path in (package / room).rglob("*.py")):
+        assert not re.search(r"\bdelete\b", source.read_text(encoding="utf-8")), source
+
+
+def test_a_shard_cut_short_says_what_is_missing(tmp_path):
+    with create(tmp_path / "0-1.nc", "a shard", "theirs"):
+        pass
+    with pytest.raises(RaptorError, match=r"cannot be read whole .*move it to another folder"):
+        read_shard(tmp_path / "0-1.nc")

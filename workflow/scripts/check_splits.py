@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 from raptor.core.jobs import logged
 from raptor.dataset.check import check_splits
 
@@ -12,5 +12,4 @@ with logged(snakemake.log[0]):
     faults = list(check_splits(stacks))
     if faults:
         raise RaptorError("; ".join(faults))
-    with atomic_path(Path(snakemake.output.checked)) as path:
-        path.write_text("no faults\n")
+    write_text(Path(snakemake.output.checked), "no faults\n")

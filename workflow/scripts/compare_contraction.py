@@ -1,11 +1,10 @@
 """Compare simulated and predicted contraction of a campaign, and find the largest difference."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, write_json
 from raptor.core.jobs import logged
 from raptor.studies.sweep import contraction, differences
 
@@ -14,5 +13,4 @@ with logged(snakemake.log[0]):
     table = contraction(pd.read_csv(snakemake.input.simulated), predicted)
     with atomic_path(Path(snakemake.output.table)) as path:
         table.to_csv(path, index=False)
-    with atomic_path(Path(snakemake.output.differences)) as path:
-        path.write_text(json.dumps(differences(table), indent=1) + "\n")
+    write_json(Path(snakemake.output.differences), differences(table))

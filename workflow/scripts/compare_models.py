@@ -1,12 +1,11 @@
 """Collect cost and errors of all models in one table."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 import torch
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_json
 from raptor.core.jobs import logged
 from raptor.studies.evaluation import compare
 from raptor.surrogate.costs import costs_of
@@ -15,7 +14,7 @@ from raptor.surrogate.files import load, read_description
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     summaries = {
-        Path(summary).parent.name: json.loads(Path(summary).read_text())[snakemake.params.campaign]
+        Path(summary).parent.name: read_json(Path(summary))[snakemake.params.campaign]
         for summary in snakemake.input.summaries
     }
     costs: dict[str, dict] = {name: {"model": name} for name in summaries}

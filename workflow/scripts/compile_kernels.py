@@ -1,6 +1,5 @@
 """Compile every kernel by one tiny simulation."""
 
-import json
 import time
 from pathlib import Path
 
@@ -8,7 +7,7 @@ import shapely
 
 from raptor.condor.simulate import simulate
 from raptor.core.compiled import source_hash
-from raptor.core.files import atomic_path
+from raptor.core.files import write_json
 from raptor.core.jobs import logged
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
@@ -21,5 +20,4 @@ with logged(snakemake.log[0]):
         tissue = simulate(mould, CellParameters(0.1, 0.5, 0.3), NetworkModel(2), accuracy)
     rasterise(tissue.positions, tissue.orientation, tissue.tension, 32)
     content = {"sources": source_hash(), "seconds": round(time.perf_counter() - started, 2)}
-    with atomic_path(Path(snakemake.output.kernels)) as path:
-        path.write_text(json.dumps(content) + "\n")
+    write_json(Path(snakemake.output.kernels), content)

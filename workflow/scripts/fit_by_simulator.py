@@ -1,10 +1,10 @@
 """Fit one tissue by the simulator, from the surrogate's fit, and verify the fit with new seeds."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
+from raptor.core.files import read_json
 from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
@@ -15,7 +15,7 @@ from raptor.parameters import CellParameters
 
 with logged(snakemake.log[0]):
     params = snakemake.params
-    before = json.loads(Path(snakemake.input.fit).read_text())
+    before = read_json(Path(snakemake.input.fit))
     simulator, target = Simulator.configured(params.simulator), Target(**before["target"])
     mould = read_at_scale(snakemake.input.mould, params.mould_scale)
     start = unit_of(CellParameters(**before["corrected"]["parameters"]))

@@ -1,11 +1,10 @@
 """Fit several tissues with common parameters, by the surrogate and by the simulator."""
 
-import json
 from pathlib import Path
 
 import torch
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_json
 from raptor.core.jobs import logged
 from raptor.fitting import Simulator, Target, fit_joint, surrogate_measure, tabulate_joint, write_fit
 from raptor.moulds.reading import read_at_scale
@@ -14,7 +13,7 @@ from raptor.surrogate.files import load
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     params, simulator = snakemake.params, Simulator.configured(snakemake.params.simulator)
-    fits = [json.loads(Path(path).read_text()) for path in snakemake.input.fits]
+    fits = [read_json(Path(path)) for path in snakemake.input.fits]
     targets = {fit["tissue"]: Target(**fit["target"]) for fit in fits}
     moulds = [read_at_scale(path, params.mould_scale) for path in snakemake.input.moulds]
     surrogate = load(Path(snakemake.input.weights[0]).parent)

@@ -1,13 +1,12 @@
 """Infer the posterior of a tissue's parameters, and rank further measurements."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import torch
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_json
 from raptor.core.jobs import logged, progress
 from raptor.fitting import PARAMETERS, Simulator, Target, infer, simulate_draws, summarise, survey, write_fit
 from raptor.fitting.experimental_design import DRAWS, rank_measurements
@@ -16,7 +15,7 @@ from raptor.surrogate.files import load
 
 with logged(snakemake.log[0]), progress("draws", DRAWS) as advance:
     torch.set_num_threads(snakemake.threads)
-    params, fit = snakemake.params, json.loads(Path(snakemake.input.fit).read_text())
+    params, fit = snakemake.params, read_json(Path(snakemake.input.fit))
     simulator, target = Simulator.configured(params.simulator), Target(**fit["target"])
     mould = read_at_scale(snakemake.input.mould, params.mould_scale)
     found = survey(load(Path(snakemake.input.weights[0]).parent), mould, simulator.seed)

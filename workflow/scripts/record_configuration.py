@@ -4,8 +4,9 @@ from pathlib import Path
 
 import yaml
 
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 from raptor.core.jobs import logged
 
-with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.configuration)) as path:
-    path.write_text(yaml.safe_dump(snakemake.params.configuration, sort_keys=False))
+with logged(snakemake.log[0]):
+    content = yaml.safe_dump(snakemake.params.configuration, sort_keys=False)
+    write_text(Path(snakemake.output.configuration), content)

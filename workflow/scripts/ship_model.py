@@ -1,11 +1,10 @@
 """Write the surrogate for the package: two small files and its card."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 
-from raptor.core.files import atomic_path
+from raptor.core.files import read_json, write_text
 from raptor.core.jobs import logged
 from raptor.report.model_card import model_card
 from raptor.surrogate.files import load, read_description, save
@@ -26,9 +25,8 @@ with logged(snakemake.log[0]):
         surrogate,
         description["training"],
         pd.read_csv(snakemake.input.history[0]),
-        json.loads(Path(snakemake.input.summary[0]).read_text())[snakemake.params.campaign],
+        read_json(Path(snakemake.input.summary[0]))[snakemake.params.campaign],
         pd.read_csv(snakemake.input.regions[0]),
         half=True,
     )
-    with atomic_path(Path(snakemake.output.card)) as path:
-        path.write_text(card)
+    write_text(Path(snakemake.output.card), card)

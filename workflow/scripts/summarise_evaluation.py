@@ -1,11 +1,10 @@
 """Summarise a model's errors: test split, regions of the parameters, other campaigns."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, write_json
 from raptor.core.jobs import logged
 from raptor.studies.evaluation import regions_of, summarise
 
@@ -16,7 +15,6 @@ with logged(snakemake.log[0]):
     summary = {name: summarise(table, floor if name == first else None) for name, table in tables.items()}
     with atomic_path(Path(snakemake.output.metrics)) as path:
         tables[first].to_csv(path, index=False)
-    with atomic_path(Path(snakemake.output.summary)) as path:
-        path.write_text(json.dumps(summary, indent=1) + "\n")
+    write_json(Path(snakemake.output.summary), summary)
     with atomic_path(Path(snakemake.output.regions)) as path:
         regions_of(tables).to_csv(path, index=False)

@@ -26,9 +26,9 @@ with logged(snakemake.log[0]):
     pixels, scaling = read_table(stacks[0]).pixels, read_scaling(Path(snakemake.input.normalisation))
     architecture = rules.architecture(pixels)
     # A checkpoint is used only if configuration and data are those of its training.
-    data = [path.read_text() for path in (*files, Path(snakemake.input.normalisation))]
+    data = [path.read_text(encoding="utf-8") for path in (*files, Path(snakemake.input.normalisation))]
     data += [str(read_table(stack).parameters) for stack in stacks]
-    data += [(begun / "model.json").read_text()] if begun else []
+    data += [(begun / "model.json").read_text(encoding="utf-8")] if begun else []
     identity = content_hash([params.identity, params.seed, *data])
     examples, splits = join_examples(stacks, [read_examples(path) for path in files])
     with progress("training", rules.epochs) as advance:

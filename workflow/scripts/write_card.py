@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 from raptor.core.jobs import logged
 from raptor.dataset.card import card
 from raptor.dataset.design import read_design
@@ -10,7 +10,7 @@ from raptor.dataset.examples import read_examples
 from raptor.dataset.shards import read_shard
 from raptor.moulds import read_moulds
 
-with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.card)) as path:
+with logged(snakemake.log[0]):
     text = card(
         snakemake.params.name,
         read_design(Path(snakemake.input.design)),
@@ -19,4 +19,4 @@ with logged(snakemake.log[0]), atomic_path(Path(snakemake.output.card)) as path:
         Path(snakemake.input.stack),
         read_examples(Path(snakemake.input.examples)),
     )
-    path.write_text(text)
+    write_text(Path(snakemake.output.card), text)

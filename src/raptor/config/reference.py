@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from raptor.config.configuration import Configuration
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 
 DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about ten minutes on two cores.
 # Every key is explained in config/README.md. Written by `raptor reference`.
@@ -57,8 +57,7 @@ def write_reference(root: Path) -> list[Path]:
         "config/README.md": README_HEAD + key_table(),
     }
     for name, content in contents.items():
-        with atomic_path(root / name) as temporary:
-            temporary.write_text(content)
+        write_text(root / name, content)
     return [root / name for name in contents]
 
 

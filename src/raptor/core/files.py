@@ -1,10 +1,12 @@
 """Files are read with clear errors and written atomically: whole or not at all."""
 
 import errno
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from raptor.core.errors import RaptorError
 
@@ -43,6 +45,33 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8, atomically."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write what JSON can hold, atomically."""
+    write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """Content of a JSON file.
+
+    Raises
+    ------
+    RaptorError
+        If it is missing, may not be read, or is not JSON.
+    """
+    try:
+        return json.loads(decoded(Path(path).read_bytes(), str(path)))
+    except OSError as error:
+        raise RaptorError(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise RaptorError(f"{path} is not JSON: {error}") from error
 
 
 def read_input(path: Path, what: str, expected: str) -> bytes:
@@ -107,7 +136,7 @@ def why_unreadable(path: Path, error: Exception) -> str:
     if not start:
         return "is empty"
     if start.startswith((b"\x89HDF", b"CDF")):
-        return f"is truncated or damaged ({error}); move it away, and make it again"
+        return f"is truncated or damaged ({error}); move it elsewhere, and the workflow makes it again"
     return f"is not netCDF: its content {kind_of(start)}"
 
 

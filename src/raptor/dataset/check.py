@@ -3,7 +3,6 @@
 Each check yields faults, one sentence each.
 """
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from raptor.condor.energy import cell_tension, objective
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS
 from raptor.core.errors import RaptorError
+from raptor.core.files import read_json
 from raptor.dataset.design import Run, read_design
 from raptor.dataset.examples import mould_images, read_examples, training_scaling
 from raptor.dataset.netcdf import open_file
@@ -362,7 +362,7 @@ def check_examples(path: Path, stack: Path) -> Iterator[str]:
 def _check_scaling(path: Path, stacks: Mapping[str, Path]) -> Iterator[str]:
     """The constants agree with the training split that they name."""
     try:
-        campaign, scaling = json.loads(path.read_text())["campaign"], read_scaling(path)
+        campaign, scaling = read_json(path)["campaign"], read_scaling(path)
         wanted = training_scaling(stacks[campaign])
     except (KeyError, ValueError, RaptorError) as error:
         yield f"{path.name}: {error}"

@@ -1,12 +1,12 @@
 """Whether two data sets are the same data (docs/data.md, rule 6)."""
 
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from raptor.core.files import read_json
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.shards import campaign_folders
 
@@ -75,6 +75,6 @@ def _equal(a: Any, b: Any) -> bool:
 
 def _table(path: Path) -> Any:
     if path.suffix in (".json", ".geojson"):
-        return json.loads(path.read_text())
-    with path.open(newline="") as file:
+        return read_json(path)
+    with path.open(newline="", encoding="utf-8") as file:
         return list(csv.reader(file))

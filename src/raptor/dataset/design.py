@@ -31,7 +31,7 @@ class Run:
 def write_design(path: Path, runs: Sequence[Run]) -> None:
     """Write a design as CSV, the campaign's own columns last."""
     own = list(dict.fromkeys(name for run in runs for name in run.own))
-    with atomic_path(path) as temporary, temporary.open("w", newline="") as file:
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow((*COLUMNS, *own))
         for run in runs:

@@ -81,7 +81,7 @@ def training_scaling(stack: Path) -> Scaling:
 
 def write_examples(path: Path, examples: list[Example]) -> None:
     """Write examples as CSV: sample, element."""
-    with atomic_path(path) as temporary, temporary.open("w", newline="") as file:
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("sample", "element"))
         writer.writerows((example.sample, example.element) for example in examples)

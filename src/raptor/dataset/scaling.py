@@ -4,7 +4,6 @@ The scaling commutes with D4: sxsx and sysy share constants, and so do sxsz and 
 are scaled symmetrically about zero.
 """
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import read_json, write_json
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.symmetry import FIELDS
 
@@ -90,8 +89,7 @@ def write_scaling(path: Path, scaling: Scaling, campaign: str) -> None:
         "from": "the training split alone",
         "campaign": campaign,
     }
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")
+    write_json(path, content)
 
 
 def read_scaling(path: Path) -> Scaling:
@@ -103,6 +101,6 @@ def read_scaling(path: Path) -> Scaling:
         If the file is missing or incomplete.
     """
     try:
-        return Scaling.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError) as error:
+        return Scaling.from_json(read_json(path))
+    except (ValueError, KeyError) as error:
         raise RaptorError(f"normalisation {path} cannot be read: {error}") from error

@@ -31,6 +31,7 @@ RESULTS = {
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",
 }
+MOVE_AWAY = "move it to another folder, and the workflow makes it again"
 CELL_VARIABLES = {
     "x0": "cast position x, in l0", "y0": "cast position y, in l0", "z0": "cast position z, in l0",
     "x": "position x, in l0", "y": "position y, in l0", "z": "position z, in l0",
@@ -198,13 +199,11 @@ def _read_failures(file: netCDF4.Dataset) -> dict[int, str]:
 @contextmanager
 def _open_shard(path: Path, configuration: str | None, group: str | None = None) -> Iterator[netCDF4.Dataset]:
     with open_file(path, group) as file:
-        if configuration is not None and (
-            getattr(file, "configuration", None) != configuration
-            or getattr(file, "model_version", None) != MODEL_VERSION
-        ):
+        found = (getattr(file, "configuration", None), getattr(file, "model_version", None))
+        if configuration is not None and found != (configuration, MODEL_VERSION):
             raise RaptorError(
-                f"shard {path} was made by another configuration or model version; delete it and "
-                "run the workflow again"
+                f"shard {path} is not of this run: it was made by configuration {found[0]}, model version "
+                f"{found[1]}, and not {configuration}, {MODEL_VERSION}; {MOVE_AWAY}"
             )
         yield file
 
@@ -235,7 +234,7 @@ def read_shard(path: Path, configuration: str | None = None, group: str | None =
             )
         except (AttributeError, KeyError, IndexError, RuntimeError) as error:
             raise RaptorError(
-                f"shard {path} is incomplete ({error}); delete it and run the workflow again"
+                f"shard {path} cannot be read whole ({' '.join(str(error).split())}); {MOVE_AWAY}"
             ) from error
 
 

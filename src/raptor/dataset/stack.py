@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.dataset.netcdf import create, open_file, variable
-from raptor.dataset.shards import Record, read_failures, read_shard, write_model
+from raptor.dataset.shards import MOVE_AWAY, Record, read_failures, read_shard, write_model
 from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.labelled import LONG_NAMES, MEASURES
 from raptor.fields.shape import shape_ratios
@@ -92,15 +92,15 @@ def build_stack(
             shard = read_shard(shard_path, simulation_configuration)
             if getattr(file, "device", shard.device) != shard.device:
                 raise RaptorError(
-                    f"shard {shard_path} was made on another device than earlier ones; delete the shards "
-                    "of one device and run the workflow again"
+                    f"shard {shard_path} was made on {shard.device} and earlier ones on {file.device}; move "
+                    "those of one of them to another folder, and the workflow makes them again"
                 )
             write_model(file, shard.model, shard.accuracy, shard.device)  # the same for all
             for record in shard.records:
                 if record.simulation not in left:
                     raise RaptorError(
                         f"shard {shard_path} holds simulation {record.simulation}, which is not in the "
-                        "design or is in another shard too; delete it and run the workflow again"
+                        f"design or is in another shard too; {MOVE_AWAY}"
                     )
                 left.remove(record.simulation)
                 run = by_id[record.simulation]

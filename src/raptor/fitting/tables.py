@@ -1,6 +1,5 @@
 """Fits as files and tables."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from raptor.core.files import atomic_path
+from raptor.core.files import write_json
 from raptor.fitting.targets import PARAMETERS, RATIOS, Target
 
 AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")
@@ -16,8 +15,7 @@ AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")
 
 def write_fit(path: Path, content: Mapping[str, Any]) -> None:
     """Write a fit as JSON; numbers that are not finite become null."""
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(_plain(content), indent=1) + "\n")
+    write_json(path, _plain(content))
 
 
 def tabulate(fits: Sequence[dict[str, Any]], simulators: Sequence[dict[str, Any]] = ()) -> pd.DataFrame:

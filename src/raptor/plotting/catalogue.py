@@ -1,6 +1,5 @@
 """Figures of a run, by name: each draws files of the run and returns the data shown."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_json
 from raptor.dataset.netcdf import open_file
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import record_fields
@@ -64,7 +63,7 @@ def _read(given: Any) -> Any:
     path = Path(given)
     if path.suffix == ".csv":
         return pd.read_csv(path)
-    return json.loads(path.read_text()) if path.suffix == ".json" else path
+    return read_json(path) if path.suffix == ".json" else path
 
 
 def _design(design: pd.DataFrame, moulds: Path) -> Drawn:

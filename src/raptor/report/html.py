@@ -4,7 +4,6 @@ The text is a Jinja template; this module gives it the run's files and formats n
 """
 
 import base64
-import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -16,15 +15,15 @@ import pandas as pd
 import yaml
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import read_json, write_text
 from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.netcdf import REFERENCES
 
 READERS: dict[str, Callable[[Path], Any]] = {
     ".csv": lambda path: pd.read_csv(path).to_dict("records"),
-    ".json": lambda path: json.loads(path.read_text()),
-    ".yaml": lambda path: yaml.safe_load(path.read_text()),
-    ".md": lambda path: path.read_text(),
+    ".json": read_json,
+    ".yaml": lambda path: yaml.safe_load(path.read_text(encoding="utf-8")),
+    ".md": lambda path: path.read_text(encoding="utf-8"),
 }
 """Readers of a run's tables and texts, by suffix."""
 NOTHING = "\N{EN DASH}"
@@ -54,8 +53,7 @@ def write_report(path: Path, template: Path, folder: Path, files: Iterable[Path]
         raise RaptorError(f"template {template} cannot be read: {error}") from error
     except jinja2.TemplateError as error:
         raise RaptorError(f"template {template}: {error}") from error
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def render(template: str, content: Mapping[str, Any], *, escape: bool = True) -> str:

@@ -1,6 +1,5 @@
 """Trained models as files."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path
+from raptor.core.files import atomic_path, read_json, write_json
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.scaling import Scaling
 from raptor.moulds.geometry import CLEARANCE, STRICTLY
@@ -60,8 +59,7 @@ def save(
         "model_version": MODEL_VERSION,
         "calibration": None if calibration is None else calibration.as_json(),
     }
-    with atomic_path(folder / MODEL) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")
+    write_json(folder / MODEL, content)
 
 
 def read_description(folder: Path) -> dict[str, Any]:
@@ -72,10 +70,7 @@ def read_description(folder: Path) -> dict[str, Any]:
     RaptorError
         If it is missing or cut short.
     """
-    try:
-        content: dict[str, Any] = json.loads((Path(folder) / MODEL).read_text())
-    except (OSError, ValueError) as error:
-        raise RaptorError(f"{Path(folder) / MODEL} cannot be read: {error}") from error
+    content: dict[str, Any] = read_json(Path(folder) / MODEL)
     return content
 
 

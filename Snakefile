@@ -6,7 +6,7 @@ min_version("9.27")
 
 if not config:
 
-    configfile: "config/laptop.yaml"
+    configfile: f"{workflow.basedir}/config/laptop.yaml"
 
 
 report: "workflow/report/workflow.rst"

@@ -1,5 +1,6 @@
 """Validation before anything runs, and names shared by all rules."""
 
+import shlex
 import sys
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from snakemake.exceptions import WorkflowError
 from raptor import config as configuration
 from raptor.core.compiled import source_hash
 from raptor.core.errors import RaptorError
+from raptor.core.jobs import hold_lock
 from raptor.core.version import MODEL_VERSION
 from raptor.moulds.library.tissues import load_tissues
 from raptor.moulds.reading import find_mould
@@ -18,7 +20,11 @@ if "name" not in config:
         "the configuration has no name; give its results a folder by 'name: ...'"
     )
 try:
-    CONFIG = configuration.parse(config, "configuration")
+    CONFIG = configuration.parse(
+        config,
+        "configuration",
+        [Path(file).parent for file in reversed(workflow.configfiles)],
+    )
     configuration.require_castable(CONFIG)
     MODELS = CONFIG.models
     TISSUES = load_tissues(
@@ -27,6 +33,10 @@ try:
     configuration.require_measurable(TISSUES, CONFIG.mould_scale)
 except RaptorError as error:
     raise WorkflowError(str(error))
+
+# Snakemake gives this path to a shell without quotes.
+if " " in sys.executable:
+    sys.executable = shlex.quote(sys.executable)
 
 RESULTS = f"results/{CONFIG.name}"
 CAMPAIGN = f"{RESULTS}/campaigns/{{campaign}}"
@@ -43,3 +53,11 @@ wildcard_constraints:
     member=r"\d+",
     tissue="|".join(TISSUES) or "none",
     case="|".join(CASES) or "none",
+
+
+onstart:
+    # One run at a time makes a folder of results: a second would remove files that the first reads.
+    try:
+        hold_lock(Path(".snakemake", f"{CONFIG.name}.lock"), RESULTS)
+    except RaptorError as error:
+        raise WorkflowError(str(error))

@@ -63,7 +63,7 @@ onsuccess:
         not TECHNICAL.exists() or TECHNICAL.stat().st_mtime < STAMP.stat().st_mtime
     ):
         shell(
-            "{sys.executable} -m snakemake --quiet --snakefile {workflow.main_snakefile}"
+            "{sys.executable} -m snakemake --quiet --snakefile {workflow.main_snakefile:q}"
             " --configfile {RESULTS}/configuration.yaml --report {RESULTS}/workflow.part.html"
             " && mv {RESULTS}/workflow.part.html {TECHNICAL}"
             " && echo 'Report: {REPORT}' >&2"

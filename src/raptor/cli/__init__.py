@@ -1,6 +1,7 @@
 """The command line: `raptor COMMAND`, one function per command, each with an example in its help."""
 
 import inspect
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -55,7 +56,12 @@ for command in COMMANDS:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line or the given arguments; bad input ends with one sentence and exit status 1."""
+    """Run the command line or the given arguments; bad input ends with one sentence and exit status 1.
+
+    One thread, unless OMP_NUM_THREADS says otherwise: networks gain little by a second, and wait for it
+    where the processors are shared (docs/surrogate.md).
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # torch, loaded later, reads it
     try:
         app(arguments, prog_name="raptor")
     except RaptorError as error:

@@ -1,6 +1,7 @@
 """Reading of YAML files, and faults of validation as sentences."""
 
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,8 @@ from raptor.moulds.library.tissues import MeasuredTissue
 from raptor.moulds.reading import read_at_scale, read_mould
 
 
-def parse(content: Any, where: str) -> Configuration:
-    """Validate a configuration.
+def parse(content: Any, where: str, folders: Sequence[Path] = ()) -> Configuration:
+    """Validate a configuration; its paths are found in `folders`, those of its files, then in this folder.
 
     Raises
     ------
@@ -23,14 +24,48 @@ def parse(content: Any, where: str) -> Configuration:
         One sentence per fault; an unknown key is named with its nearest known one.
     """
     try:
-        return Configuration.model_validate(content)
+        found = Configuration.model_validate(content)
     except ValidationError as error:
         raise RaptorError("; ".join(explain(error, where, Configuration))) from None
+    return _with_paths(found, folders)
 
 
 def load(path: Path) -> Configuration:
     """Read and validate a configuration file."""
-    return parse(read_yaml(Path(path)), str(path))
+    return parse(read_yaml(Path(path)), str(path), [Path(path).parent])
+
+
+def _with_paths(configuration: Configuration, folders: Sequence[Path]) -> Configuration:
+    """The configuration, with paths of moulds and tissues as seen from the current folder."""
+    campaigns = dict(configuration.campaigns)
+    for name, campaign in campaigns.items():
+        if campaign.kind is None and campaign.repeat_of is None:
+            given = campaign.moulds
+            paths = (
+                _found(given, folders) if isinstance(given, str) else tuple(_found(m, folders) for m in given)
+            )
+            campaigns[name] = campaign.model_copy(update={"moulds": paths})
+    cases = {
+        name: case.model_copy(update={"mould": _found(case.mould, folders)})
+        for name, case in configuration.tradeoff.cases.items()
+    }
+    fit = configuration.fit
+    if fit.tissues_file is not None:
+        fit = fit.model_copy(update={"tissues_file": _found(fit.tissues_file, folders)})
+    tradeoff = configuration.tradeoff.model_copy(update={"cases": cases})
+    return configuration.model_copy(update={"campaigns": campaigns, "tradeoff": tradeoff, "fit": fit})
+
+
+def _found(name: str, folders: Sequence[Path]) -> str:
+    """A path in the first of `folders` that has it; as given where it is the same in the current folder."""
+    here = Path(name)
+    for beside in (Path(folder) / name for folder in folders):
+        if beside.exists():
+            if here.exists() and here.samefile(beside):
+                return name
+            path = Path(os.path.normpath(beside.absolute()))
+            return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+    return name
 
 
 def require_castable(configuration: Configuration) -> None:

@@ -1,6 +1,8 @@
-"""Common parts of long-running jobs: a log file, a progress bar, errors in one sentence."""
+"""Common parts of long-running jobs: a log file, a progress bar, errors in one sentence, a lock."""
 
 import logging
+import os
+import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -51,3 +53,33 @@ def progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
             bar.update(task, advance=1, note=note)
 
         yield advance
+
+
+def hold_lock(path: Path, what: str) -> None:
+    """Keep others from doing `what` until this process ends, in whichever way.
+
+    The system drops the lock with the process, so none is left behind by one that was killed.
+
+    Raises
+    ------
+    RaptorError
+        If another process holds it.
+    """
+    import fcntl  # not on Windows
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(path, os.O_RDWR | os.O_CREAT)  # closed with the process, and not passed on to its jobs
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        holder = os.read(file, 200).decode(errors="replace").strip()
+        os.close(file)
+        raise RaptorError(
+            f"{what} is being made by {holder or 'another run'}; wait until that run ends, or stop it, and "
+            "give the same command again"
+        ) from error
+    except OSError as error:  # some network file systems
+        log.warning("%s cannot be locked (%s), so start one run at a time", path, error.strerror)
+        return
+    os.ftruncate(file, 0)
+    os.write(file, f"process {os.getpid()} on {socket.gethostname()}\n".encode())

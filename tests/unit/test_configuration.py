@@ -1,15 +1,19 @@
 import json
+import shutil
 
 import jsonschema
 import pytest
 import yaml
 from pydantic import ValidationError
 
-from raptor.config import Configuration, load, require_measurable
+from raptor.config import Configuration, load, parse, require_castable, require_measurable
 from raptor.config.reference import key_table, write_reference
 from raptor.core.errors import RaptorError
+from raptor.moulds.library import MOULDS
 from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
 from raptor.parameters import CellParameters
+
+MIDDLE = {"delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3}
 
 
 @pytest.fixture
@@ -242,3 +246,34 @@ def test_a_gpu_is_not_made_up(monkeypatch):
     assert chosen_device("auto", gpus=0) == "cpu"  # a job that was given none
     monkeypatch.setattr("shutil.which", lambda name: None)
     assert chosen_device("auto") == "cpu"
+
+
+def test_paths_are_found_beside_the_configuration_then_here_then_in_the_library(tmp_path, monkeypatch):
+    study, desk = tmp_path / "my stüdy", tmp_path / "desk"
+    study.mkdir()
+    desk.mkdir()
+    for folder, name in ((study, "mine"), (desk, "here"), (study, "both"), (desk, "both")):
+        shutil.copy(MOULDS["small_rectangle"], folder / f"{name}.geojson")
+    (study / "tissues.yaml").write_text("{mine: {description: x, mould: mine.geojson, area_ratio: 0.8}}")
+    content = {
+        "name": "study",
+        "campaigns": {"a": {"moulds": ["mine.geojson", "here.geojson", "both.geojson", "glial_1"]}},
+        "models": {},
+        "tradeoff": {"cases": {"one": {"mould": "mine.geojson", **MIDDLE}}},
+        "fit": {"tissues_file": "tissues.yaml", "tissues": ["mine"]},
+    }
+    (study / "study.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.chdir(desk)
+    found = load(study / "study.yaml")
+    mine = str(study / "mine.geojson")
+    assert found.campaigns["a"].moulds == (mine, "here.geojson", str(study / "both.geojson"), "glial_1")
+    assert found.tradeoff.cases["one"].mould == mine
+    assert load_tissues(found.fit.tissues_file)["mine"].mould == mine
+    require_castable(found)
+    # Where the two folders are one, a path stays as it is written, and so does the campaign's fingerprint.
+    monkeypatch.chdir(study)
+    beside = load(study / "study.yaml")
+    assert beside.campaigns["a"].moulds[0] == "mine.geojson"
+    assert beside.fingerprint("design", "a") == parse(content, "here").fingerprint("design", "a")
+    monkeypatch.chdir(tmp_path)
+    assert load(study / "study.yaml").campaigns["a"].moulds[0] == "my stüdy/mine.geojson"

@@ -1,5 +1,6 @@
 """Files as people have them: drawings, pictures and tables of many programs (tests/data/doors)."""
 
+import os
 import re
 import subprocess
 import sys
@@ -14,9 +15,11 @@ import yaml
 from PIL import Image
 
 import raptor
+from raptor.cli import main
 from raptor.core.blocks import read_yaml
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input, read_json
+from raptor.core.jobs import hold_lock
 from raptor.core.pixels import TURNS, read_pixels
 from raptor.dataset.design import read_design
 from raptor.dataset.netcdf import create, open_file
@@ -218,3 +221,35 @@ def test_a_shard_cut_short_says_what_is_missing(tmp_path):
         pass
     with pytest.raises(RaptorError, match=r"cannot be read whole .*move it to another folder"):
         read_shard(tmp_path / "0-1.nc")
+
+
+HOLDER = """
+import sys
+from pathlib import Path
+from raptor.core.jobs import hold_lock
+hold_lock(Path(sys.argv[1]), "results")
+print("held", flush=True)
+input()
+"""
+
+
+def test_a_lock_names_its_holder_and_dies_with_it(tmp_path):
+    path = tmp_path / ".snakemake" / "laptop.lock"
+    command = [sys.executable, "-c", HOLDER, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(RaptorError, match=f"results is being made by process {holder.pid} on"):
+            hold_lock(path, "results")
+        holder.kill()
+    hold_lock(path, "results")
+
+
+def test_the_command_line_takes_one_thread_unless_told(monkeypatch):
+    for given, wanted in ((None, "1"), ("3", "3")):
+        monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+        if given:
+            monkeypatch.setenv("OMP_NUM_THREADS", given)
+        with pytest.raises(SystemExit):
+            main(["moulds", "--help"])
+        assert os.environ["OMP_NUM_THREADS"] == wanted

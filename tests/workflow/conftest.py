@@ -22,7 +22,6 @@ class Workplace:
     def __init__(self, folder):
         self.folder = folder
         folder.mkdir(exist_ok=True)
-        (folder / "config").symlink_to(ROOT / "config")
 
     def command(self, *arguments, configuration=TINY):
         return [

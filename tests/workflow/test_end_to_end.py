@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from safetensors.numpy import load_file
 
+from raptor.core.jobs import hold_lock
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
 from raptor.symmetry import FIELDS
@@ -228,3 +229,13 @@ def test_a_truncated_shard_stops_the_run_with_one_sentence(results, workplace):
     done = place.run("--cores", "2", target)
     assert done.returncode == 0
     assert differences(results / "campaigns" / "paper", paper) == []
+
+
+def test_a_second_run_at_once_is_refused_and_touches_nothing(workplace):
+    place = workplace("twice")
+    hold_lock(place.folder / ".snakemake" / "tiny.lock", "results/tiny")
+    done = place.run("--cores", "1", "results/tiny/configuration.yaml")
+    assert done.returncode != 0
+    assert f"results/tiny is being made by process {os.getpid()} on" in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+    assert not (place.folder / "results").exists()

@@ -18,8 +18,8 @@ DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about
 README_HEAD = """# Configuration
 
 `laptop.yaml` is the default. Another file, such as `paper.yaml`, states only what differs; choose it with
-`--configfile config/paper.yaml`. Unknown keys are errors. Every simulation belongs to an entry of
-`campaigns`; a new study is one more entry:
+`--configfile config/paper.yaml`. Unknown keys are errors. Paths are found beside the configuration, then in
+the folder of the run. Every simulation belongs to an entry of `campaigns`; a new study is one more entry:
 
 ```yaml
 campaigns:

@@ -53,13 +53,17 @@ def lattice() -> None:
     write(axes, "spacing")
     axes = panel()
     centre = np.array([2, 2])
-    for shell, (neighbours, colour, text) in enumerate(
+    signs = [(1, 1), (-1, 1), (1, -1), (-1, -1)]
+    shells = (
+        ([(1, 0), (0, 1), (-1, 0), (0, -1), *(0.5 * np.array(signs))], THIRD, "nearest: $\\kappa_0$"),
+        (signs, SIMULATED, "second: $\\kappa_{NNN}$"),
         (
-            ([(1, 0), (0, 1), (-1, 0), (0, -1), (0.5, 0.5), (-0.5, 0.5), (0.5, -0.5), (-0.5, -0.5)], THIRD, "nearest: $\\kappa_0$"),
-            ([(1, 1), (-1, 1), (1, -1), (-1, -1)], SIMULATED, "second: $\\kappa_{NNN}$"),
-            ([(1.5, 0.5), (-1.5, 0.5), (0.5, 1.5), (0.5, -1.5), (-0.5, 1.5), (-0.5, -1.5), (1.5, -0.5), (-1.5, -0.5)], PREDICTED, "third: $\\kappa_{NNNN}$"),
-        )
-    ):  # fmt: skip
+            [*(np.array(signs) * (1.5, 0.5)), *(np.array(signs) * (0.5, 1.5))],
+            PREDICTED,
+            "third: $\\kappa_{NNNN}$",
+        ),
+    )
+    for shell, (neighbours, colour, text) in enumerate(shells):
         for step in neighbours:
             axes.plot(*np.transpose([centre, centre + step]), color=colour, lw=1.6, zorder=3 - shell)
             axes.plot(*(centre + step), "o", color=colour, ms=4)
@@ -80,7 +84,7 @@ def contraction() -> None:
         axes.plot(ends, [y, y], color=THIRD, lw=1)
         for x in ends:
             half = 0.35 * np.array([np.cos(angle), np.sin(angle)])
-            axes.plot(*np.transpose([(x, y) - half, (x, y) + half]), color=SIMULATED, **ROD)
+            axes.plot(*(np.array([[x], [y]]) + np.outer(half, (-1, 1))), color=SIMULATED, **ROD)
         axes.text(3.0, y, text, va="center")
     axes.set(xlim=(-0.6, 7), ylim=(-0.9, 2.8))
     write(axes, "delta")

@@ -154,8 +154,11 @@ def test_the_picture_of_a_tissue_says_its_numbers_and_marks_lost_tethers(kind, r
 
 def test_a_curve_of_a_mould_is_predicted_and_simulated(tmp_path):
     cells = [raptor.CellParameters(delta, 0.5, 0.25) for delta in (0.2, 0.6)]
+    predictions = raptor.predict("small_rectangle", cells)
+    assert predictions[1].area_ratio == raptor.predict("small_rectangle", cells[1]).area_ratio
     table = raptor.sweep("small_rectangle", cells, simulations=2)
     assert table["delta"].tolist() == [0.2, 0.6]
+    assert table["area_ratio"].tolist() == [each.area_ratio for each in predictions]
     for name in ("area_ratio", "simulated_area_ratio", "width_ratio", "simulated_width_ratio"):
         assert table[name].is_monotonic_decreasing
     assert (table["simulated_area_ratio_std"] < 0.1).all()

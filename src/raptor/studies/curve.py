@@ -10,7 +10,7 @@ import pandas as pd
 from raptor.condor.simulate import simulate
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
-from raptor.parameters import CellParameters
+from raptor.parameters import CellParameters, require_parameters
 from raptor.surrogate.command import load_surrogate
 from raptor.surrogate.inference import Surrogate
 
@@ -53,7 +53,7 @@ def sweep(
     if not isinstance(surrogate, Surrogate):
         surrogate = load_surrogate(surrogate)
     for point in cells:
-        point.require_sampled("prediction")
+        require_parameters(point).require_sampled("prediction")
     cast, rows = surrogate.cast(mould), []
     for point in cells:
         predicted = surrogate.examine(cast, point).numbers

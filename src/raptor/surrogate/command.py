@@ -1,7 +1,9 @@
 """Prediction as a user asks for it."""
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import overload
 
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
@@ -28,17 +30,33 @@ def load_surrogate(path: str | Path | None = None) -> Surrogate:
     return _shipped() if path is None else load(Path(path))
 
 
+@overload
 def predict(
     mould: Mould | str | Path, cells: CellParameters, surrogate: Surrogate | str | Path | None = None
-) -> Prediction:
+) -> Prediction: ...
+
+
+@overload
+def predict(
+    mould: Mould | str | Path,
+    cells: Sequence[CellParameters],
+    surrogate: Surrogate | str | Path | None = None,
+) -> list[Prediction]: ...
+
+
+def predict(
+    mould: Mould | str | Path,
+    cells: CellParameters | Sequence[CellParameters],
+    surrogate: Surrogate | str | Path | None = None,
+) -> Prediction | list[Prediction]:
     """Predict the tissue of a mould by a surrogate, with 50, 80 and 95 % bands.
 
     Parameters
     ----------
     mould : Mould, str or Path
         A mould, or what `read_mould` reads: a name of the library, or a file.
-    cells : CellParameters
-        Within the range of the training set.
+    cells : CellParameters or sequence of CellParameters
+        Within the range of the training set. Of several, a list of predictions is returned.
     surrogate : Surrogate, str, Path or None
         A surrogate or its folder; None for the shipped one.
 
@@ -52,10 +70,13 @@ def predict(
     --------
     >>> prediction = predict("glial_1", CellParameters(0.5, 0.5, 0.3))
     """
-    mould, cells = as_mould(mould), require_parameters(cells).require_sampled("prediction")
+    several = cells if isinstance(cells, Sequence) else [cells]
+    points = [require_parameters(each).require_sampled("prediction") for each in several]
     if not isinstance(surrogate, Surrogate):
         surrogate = load_surrogate(surrogate)
-    return surrogate.examine(mould, cells)
+    cast = surrogate.cast(as_mould(mould))
+    predictions = [surrogate.examine(cast, point) for point in points]
+    return predictions if isinstance(cells, Sequence) else predictions[0]
 
 
 @cache

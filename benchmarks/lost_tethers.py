@@ -44,7 +44,9 @@ SETTINGS = {
     "walls of stiffness 50": Setting(50.0, STANDARD),
     "walls of stiffness 400": Setting(400.0, STANDARD),
     "small steps of Delta": Setting(STIFFNESS, replace(STANDARD, shortening=0.05)),
-    "each step minimised": Setting(STIFFNESS, replace(STANDARD, ftol=-1.0, step_evaluations=30000)),
+    "each step minimised": Setting(
+        STIFFNESS, replace(STANDARD, ftol=STANDARD.last_ftol, step_evaluations=10000)
+    ),
     "no agitation": Setting(STIFFNESS, replace(STANDARD, sweeps=0)),
     "fivefold agitation": Setting(STIFFNESS, replace(STANDARD, sweeps=5 * STANDARD.sweeps)),
 }

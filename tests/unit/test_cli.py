@@ -384,3 +384,12 @@ def test_a_range_that_cannot_be_read_is_named_before_any_work(tmp_path, text):
     assert done.returncode == 1
     assert f"--delta is '{text}'; give a number, or START:STOP:COUNT" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_command_says_what_one_would_do_next_on_standard_error(tmp_path):
+    done = raptor("draw", DOG_BONE / "dog_bone.svg", "--scale", 0.8)
+    assert done.stderr.splitlines()[-1] == (
+        f"next: raptor simulate {DOG_BONE / 'dog_bone.svg'} --scale 0.8 --tissue glial_1 --output tissue.nc"
+    )
+    assert "next" not in done.stdout
+    assert "next" not in raptor("draw", DOG_BONE / "dog_bone.svg", "--json").stderr

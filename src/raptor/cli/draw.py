@@ -55,4 +55,5 @@ def draw(
     if geojson is not None:
         write_moulds(geojson, [shape])
     sentence = f"{mould}: " + ", ".join(f"{name} {value}" for name, value in rows.items())
-    opt.report(sentence, numbers | {"picture": output, "geojson": geojson}, as_json)
+    then = f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} --tissue glial_1 --output tissue.nc"
+    opt.report(sentence, numbers | {"picture": output, "geojson": geojson}, as_json, then)

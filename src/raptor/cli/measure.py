@@ -60,4 +60,6 @@ def measure(
     opt.save_picture(measured, overlay)
     if outline is not None:
         measured.save(outline)
-    opt.report(f"{image}: {measured}", measured.numbers, as_json)
+    ratios = f"--area-ratio {measured.area_ratio:.4f} --width-ratio {measured.width_ratio:.4f}"
+    then = f"raptor fit {opt.words(mould, scale, mm_per_l0, mould_page)} {ratios} --output fit.json"
+    opt.report(f"{image}: {measured}", measured.numbers, as_json, then)

@@ -1,6 +1,7 @@
 """Shared by several commands: arguments, parameters by flag or by tissue, and output."""
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import fields
 from math import isfinite
@@ -132,20 +133,41 @@ def save_picture(what: Any, picture: Path | None, fields: bool = False) -> None:
         save_picture(raptor.plot(what, fields=fields), picture)
 
 
-def finish(result: "Result", output: Path, picture: Path | None, fields: bool, as_json: bool) -> None:
-    """Write a tissue or a prediction and its picture, and print a summary."""
+def finish(
+    result: "Result", output: Path, picture: Path | None, fields: bool, as_json: bool, then: str = ""
+) -> None:
+    """Write a tissue or a prediction and its picture, and print a summary and the next command."""
     raptor.save(result, output)
     save_picture(result, picture, fields)
     numbers = result.numbers | {"mm_per_l0": result.mould.mm_per_l0, "output": output, "picture": picture}
-    report(f"{output}: {result}", numbers, as_json)
+    if not then and picture is None:
+        then = f"raptor plot {quote(output)} --output {quote(output.with_suffix('.png'))}"
+    report(f"{output}: {result}", numbers, as_json, then)
 
 
-def report(sentence: str, numbers: Mapping[str, Any], as_json: bool) -> None:
-    """Print a result: a sentence, or its numbers as one JSON object with NaN and infinity as null."""
+def report(sentence: str, numbers: Mapping[str, Any], as_json: bool, then: str = "") -> None:
+    """Print a result: a sentence, or its numbers as one JSON object with NaN and infinity as null.
+
+    After a sentence, the next command, on standard error: what a user would do then.
+    """
     if not as_json:
         typer.echo(sentence)
+        if then:
+            typer.echo(f"next: {then}", err=True)
         return
     typer.echo(json.dumps({name: _plain(value) for name, value in numbers.items()}, indent=1))
+
+
+def quote(path: object) -> str:
+    """A path as a shell reads it."""
+    return shlex.quote(str(path))
+
+
+def words(mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None) -> str:
+    """A mould as it was given on the command line, for the next command."""
+    given = {"--scale": scale, "--mm-per-l0": mm_per_l0, "--page": page}
+    flags = (f"{flag} {value:g}" for flag, value in given.items() if value is not None)
+    return " ".join([quote(mould), *flags])
 
 
 def _plain(value: Any) -> Any:

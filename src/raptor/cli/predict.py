@@ -33,4 +33,11 @@ def predict(
     shape = opt.read_mould(mould, scale, mm_per_l0, page)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
-    opt.finish(raptor.predict(shape, cells, model), output, picture, fields, as_json)
+    found = raptor.predict(shape, cells, model)
+    point = f"--delta {cells.delta:g} --kappa-nnn {cells.kappa_nnn:g} --kappa-nnnn {cells.kappa_nnnn:g}"
+    then = (
+        f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} {point} --output simulated.nc"
+        if found.unusual
+        else ""
+    )
+    opt.finish(found, output, picture, fields, as_json, then)

@@ -16,6 +16,7 @@ from PIL import Image
 
 import raptor
 from raptor.cli import main
+from raptor.cli.options import require_writable
 from raptor.core.blocks import read_yaml
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_input, read_json
@@ -253,3 +254,18 @@ def test_the_command_line_takes_one_thread_unless_told(monkeypatch):
         with pytest.raises(SystemExit):
             main(["moulds", "--help"])
         assert os.environ["OMP_NUM_THREADS"] == wanted
+
+
+def test_a_folder_that_may_not_be_written_is_named_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)  # root may write everywhere
+    with pytest.raises(RaptorError, match=f"folder {tmp_path} may not be written"):
+        require_writable(tmp_path / "tissue.nc")
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16"])
+def test_a_configuration_in_another_encoding_is_named_by_workflow_env(encoding, tmp_path):
+    (tmp_path / "größe.yaml").write_text("# Größe\nname: a\n", encoding=encoding)
+    command = [DATA.parents[1] / "workflow" / "env", "snakemake", "--configfile", "größe.yaml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "größe.yaml is not UTF-8 text" in done.stderr

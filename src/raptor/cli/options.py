@@ -1,6 +1,7 @@
 """Shared by several commands: arguments, parameters by flag or by tissue, and output."""
 
 import json
+import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields
@@ -103,13 +104,16 @@ def require_writable(output: Path, *others: Path | None, kind: str = "a netCDF f
     Raises
     ------
     RaptorError
-        If the path is a folder or another file of the command, or its folder does not exist.
+        If the path is a folder or another file of the command, or its folder does not exist or may
+        not be written.
     """
     if output.is_dir():
         raise raptor.RaptorError(f"{output} is a folder; give the name of {kind}")
     folder = output.parent
     if not folder.is_dir():
         raise raptor.RaptorError(f"folder {folder} does not exist; create it or choose another output")
+    if not os.access(folder, os.W_OK):
+        raise raptor.RaptorError(f"folder {folder.resolve()} may not be written; choose another output")
     if any(other is not None and output.resolve() == other.resolve() for other in others):
         raise raptor.RaptorError(
             f"{output} is another file of this command too; choose another name for {kind}"

@@ -41,7 +41,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
                 "again: finished files are kept"
             ) from error
         if isinstance(error, OSError):
-            raise RaptorError(f"{path} cannot be written: {error}") from error
+            raise RaptorError(f"{path} cannot be written: {error.strerror or error}") from error
         raise
     finally:
         temporary.unlink(missing_ok=True)

@@ -1,7 +1,9 @@
 import base64
 
 import pytest
+import yaml
 
+from raptor.config import parse
 from raptor.core.errors import RaptorError
 from raptor.report.html import NOTHING, number, percent, section, write_report
 
@@ -52,3 +54,14 @@ def test_a_template_that_asks_for_what_is_not_there_is_a_clear_error(tmp_path):
     template.write_text("{{ nothing }}")
     with pytest.raises(RaptorError, match="'nothing' is undefined"):
         write_report(tmp_path / "report.html", template, tmp_path, [])
+
+
+def test_a_study_of_one_s_own_has_a_report_without_a_surrogate(pytestconfig, tmp_path):
+    """Nothing but the configuration is there: every part of the text can be left out."""
+    mine = {"moulds": "glial_1", "grid": {"delta": [0.5], "kappa_nnn": [0.5], "ratio": [0.5]}}
+    content = {"name": "mine", "campaigns": {"mine": mine}, "models": {}, "tradeoff": {"cases": {}}}
+    configuration = parse(content, "a test").model_dump(mode="json")
+    (tmp_path / "configuration.yaml").write_text(yaml.safe_dump(configuration))
+    template = pytestconfig.rootpath / "workflow" / "report" / "report.html.jinja"
+    write_report(tmp_path / "report.html", template, tmp_path, [tmp_path / "configuration.yaml"])
+    assert "</html>" in (tmp_path / "report.html").read_text()

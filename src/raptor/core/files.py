@@ -102,12 +102,14 @@ SIGNATURES = {
     b"\x89PNG": "a PNG picture", b"\xff\xd8\xff": "a JPEG picture", b"II*\0": "a TIFF picture",
     b"MM\0*": "a TIFF picture", b"GIF8": "a GIF picture", b"BM": "a BMP picture", b"RIFF": "a WebP picture",
     b"8BPS": "a Photoshop document", b"%PDF": "PDF", b"%!PS": "PostScript", b"AC10": "a DWG drawing",
+    b"0\nSECTION": "a DXF drawing", b"0\r\nSECTION": "a DXF drawing",
     b"PK\3\4": "a ZIP archive or an Office document", b"\x1f\x8b": "a gzip archive", b"CDF": "netCDF",
     b"\x89HDF": "HDF5 or netCDF", b"ZISRAWFILE": "a Zeiss CZI picture",
     b"\xda\xce\xbe\x0a": "a Nikon ND2 file",
     b"p\0\0\0": "a Leica LIF picture", b"{": "JSON", b"<svg": "SVG", b"<?xml": "XML",
     b"<!DOCTYPE html": "HTML", b"<html": "HTML",
 }  # fmt: skip
+UNKNOWN = "looks like none that is known"
 MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 """Encodings by the mark that a text begins with."""
 
@@ -122,7 +124,7 @@ def kind_of(content: bytes) -> str:
     for signature, kind in SIGNATURES.items():
         if content.startswith(signature) or start.startswith(signature):
             return f"looks like {kind}"
-    return "looks like none that is known"
+    return UNKNOWN
 
 
 def why_unreadable(path: Path, error: Exception) -> str:
@@ -171,6 +173,8 @@ def decoded(content: bytes, where: str) -> str:
     try:
         return content.decode(encoding)
     except UnicodeDecodeError as error:
+        if (kind := kind_of(content)) != UNKNOWN and content[:1] not in b"{[<":
+            raise RaptorError(f"{where} is not text: its content {kind}") from error
         line = content.count(b"\n", 0, error.start) + 1
         likely = content[error.start : error.start + 1].decode("latin-1")
         raise RaptorError(

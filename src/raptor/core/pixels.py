@@ -164,6 +164,8 @@ def _planes(series: Any) -> int:
 
 def _page(count: int, page: int | None, where: str) -> int:
     """The page to read, from 1; raises if it does not exist, or if none of several is chosen."""
+    if count == 0:
+        raise RaptorError(f"{where} is truncated or damaged: it holds no picture; save it again")
     if page is None and count > 1:
         raise RaptorError(
             f"{where} holds {count} pages (time points, slices or channels); give --page 1 to {count}"

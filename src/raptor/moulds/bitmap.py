@@ -20,6 +20,7 @@ from raptor.moulds.geometry import Circle
 WHITE = 0.9  # lightness, out of 1, from which a pixel is outside
 TINT = 0.3  # largest difference of green and blue, or excess over red, out of 1
 RED = 0.25  # least excess of red over green and blue in a tether, out of 1
+SHADE = 0.2  # largest difference of greys within the depression, out of 1
 TOLERANCE = 0.5  # pixels; largest distance of a simplified wall from the contour
 BLUR = 1.0  # pixels; precision to which drawing programs place a wall
 MOST_PIXELS = 4096  # per side
@@ -72,6 +73,7 @@ def _walls(colours: NDArray[np.float64], where: str) -> Iterator[Shape]:
             f"{where} shows {len(bodies)} dark pieces ({places}); a mould is one connected depression on "
             "white, so join the pieces, or paint stray ones white"
         )
+    _require_one_grey(light, float(np.median(grey)), bodies[0].difference(painted), where)
     outline = shapely.Polygon(bodies[0].exterior).simplify(TOLERANCE)
     holes = [shapely.Polygon(ring) for ring in bodies[0].interiors]
     yield Shape("of the depression", outline, "outline")
@@ -90,6 +92,17 @@ def _require_known(colours: NDArray[np.float64], where: str) -> None:
             f"{where} has the colour {colour} at column {column}, row {row}; allowed are white (outside), "
             "black or grey (depression) and red (tether)"
         )
+
+
+def _require_one_grey(light: NDArray[np.float64], grey: float, body: shapely.Polygon, where: str) -> None:
+    """Raise a RaptorError naming a spot of another grey in the depression: a tether that lost its red."""
+    for spot in _regions(np.abs(light - grey) - SHADE):
+        inside = spot.intersection(body.buffer(-2)).buffer(-2)
+        if not inside.is_empty:
+            raise RaptorError(
+                f"{where} has a spot of another grey within the depression, at {_place(inside)}; paint "
+                "tethers red or white, and the depression in one grey"
+            )
 
 
 def _regions(field: NDArray[np.float64]) -> list[shapely.Polygon]:

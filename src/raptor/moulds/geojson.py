@@ -10,7 +10,7 @@ from typing import Any
 import shapely
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path, read_text
+from raptor.core.files import atomic_path, kind_of, read_text
 from raptor.moulds.geometry import Circle, Mould, PolygonTether, Tether
 
 GEOMETRIES = ("Polygon", "MultiPolygon", "LineString", "MultiLineString", "GeometryCollection")
@@ -48,7 +48,8 @@ def read_features(path: Path) -> list[dict[str, Any]]:
     except RecursionError:
         raise RaptorError(f"mould file {path} is nested too deeply; a mould is a Polygon or a few") from None
     except ValueError as error:  # not JSON, or a number of thousands of digits
-        raise RaptorError(f"mould file {path} is not GeoJSON: {str(error).split(';')[0]}") from error
+        found = "" if text.lstrip()[:1] in "[{" else f"; its content {kind_of(text[:200].encode())}"
+        raise RaptorError(f"mould file {path} is not GeoJSON: {str(error).split(';')[0]}{found}") from error
     kind = document.get("type") if isinstance(document, dict) else None
     features: list[Any] = []
     if kind == "FeatureCollection":

@@ -20,7 +20,7 @@ import shapely
 import svgelements
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import read_input
+from raptor.core.files import decoded, kind_of, read_input
 from raptor.moulds.drawing import Drawing, Line, Page, Shape, circle_of, role_of
 from raptor.moulds.geometry import CIRCLE_SEGMENTS
 from raptor.moulds.rendering import SHAPES, Drawn, drawn_shapes, tag_of
@@ -76,8 +76,11 @@ def _root(content: bytes, where: str) -> Element:
             content = gzip.decompress(content)
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError, OSError, EOFError) as error:
+        if content[:1].lstrip() == b"<" and b"<?xml" not in content[:200]:
+            decoded(content, where)  # UTF-8, as it says no other; this names another encoding
+        kind = "" if content.lstrip()[:1] == b"<" else f" (its content {kind_of(content)})"
         raise RaptorError(
-            f"{where} is not SVG, or is truncated: {error}; save it again as plain SVG"
+            f"{where} is not SVG, or is truncated: {error}{kind}; save it again as plain SVG"
         ) from error
     if tag_of(root) != "svg":
         raise RaptorError(f"{where} is not SVG: its root is <{tag_of(root)}>; save it as plain SVG")

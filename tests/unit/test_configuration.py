@@ -163,13 +163,13 @@ def test_a_model_does_not_select_what_it_learns_from():
         Configuration.model_validate({"campaigns": campaigns, "models": models})
     models = {"film_unet": {}, "active": {"campaigns": ["paper", "active"], "initial_weights": "film_unet"}}
     config = Configuration.model_validate({"campaigns": campaigns, "models": models})
-    assert (config.surrogate, config.training_campaign) == ("film_unet", "paper")
+    assert (config.surrogate, config.main_campaign) == ("film_unet", "paper")
 
 
 def test_without_models_campaigns_are_only_simulated():
     config = Configuration.model_validate({"campaigns": {"mine": {"moulds": "i_shape"}}, "models": {}})
     assert config.surrogate is None
-    assert config.training_campaign is None
+    assert config.main_campaign is None
     assert not config.trial("soft")["surrogate"]
     with pytest.raises(ValidationError, match="to simulate only"):
         Configuration.model_validate({"campaigns": {"mine": {"moulds": "i_shape"}}})

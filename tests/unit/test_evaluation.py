@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,14 @@ from scipy.ndimage import gaussian_filter
 
 from raptor.core.errors import RaptorError
 from raptor.dataset.design import read_design
-from raptor.dataset.examples import Example, join_examples, list_examples, training_scaling, transform_sample
+from raptor.dataset.examples import (
+    Example,
+    join_examples,
+    list_examples,
+    training_rows,
+    training_scaling,
+    transform_sample,
+)
 from raptor.dataset.stack import read_samples, read_table
 from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_centres, pixel_size
@@ -55,7 +63,7 @@ def surrogate(stack, moulds):
     architecture, scaling = Architecture(pixels=32, base_channels=4), training_scaling(stack)
     members = tuple(Generator(architecture, scaling).eval() for _ in range(2))
     plain = Surrogate(members, architecture, scaling, MODEL.layers, 32)
-    return replace(plain, calibration=calibrate(plain, stack, moulds, 0))
+    return replace(plain, calibration=calibrate(plain, {stack: moulds}, 0))
 
 
 def test_bands_hold_their_share_of_errors_like_those_they_were_fitted_to():
@@ -240,8 +248,27 @@ def test_examples_of_two_stacks_are_counted_through(stack):
     table = read_table(stack)
     both, splits = join_examples([stack, stack], [one, one])
     assert splits == 2 * table.split
-    learnt = [example for example in one if table.split[example.sample] == "train"]
-    assert len(both) == len(one) + len(learnt)
-    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, [*one, *learnt], scaling)
+    assert len(both) == 2 * len(one)
+    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, [*one, *one], scaling)
     for number in range(len(both)):
         assert all(torch.equal(a, b) for a, b in zip(joined[number], alone[number], strict=True))
+
+
+def test_what_a_model_learns_from_is_of_all_its_campaigns(stack, surrogate, moulds, tmp_path):
+    """Scaling and descriptors of the training runs of both, calibration on the validation runs of both."""
+    other = build(tmp_path / "other", 6, design("other"))
+    second, again = other / "fields.nc", moulds_by_id(other / "moulds.geojson")
+    alone, both = [training_scaling(s) for s in (stack, second)], training_scaling(stack, second)
+    assert both.scale[0] == max(one.scale[0] for one in alone)
+    told = []
+    found = calibrate(surrogate, {stack: moulds, second: again}, 0, on_progress=told.append)
+    assert len(told) == sum(len(read_table(each).rows("validation")) for each in (stack, second))
+    assert len(found.training.points) == sum(len(read_table(s).rows("train")) for s in (stack, second))
+
+
+def test_a_part_of_the_training_runs_is_in_every_larger_part(stack):
+    parts = [training_rows(stack, fraction) for fraction in (0.3, 0.5, 1.0)]
+    assert [len(part) for part in parts] == [1, 2, 3]
+    assert all(set(small) <= set(large) for small, large in pairwise(parts))
+    examples, _ = join_examples([stack], [list_examples(stack)], 0.3)
+    assert {e.sample for e in examples} == {*parts[0], *read_table(stack).rows("validation")}

@@ -78,6 +78,7 @@ def test_every_file_says_what_it_is(results):
                 "history",
                 "references",
                 "configuration",
+                "license",
             ):
                 assert getattr(file, name), (path, name)
             for variable in file.variables.values():
@@ -106,7 +107,7 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
         "alignment", "anisotropy",
     }  # fmt: skip
     assert all(0 <= share <= 1 for share in metrics["paper"]["coverage"].values())
-    floor = pd.read_csv(results / "evaluation" / "floor.csv")
+    floor = pd.read_csv(results / "evaluation" / "floors" / "paper.csv")
     assert floor["runs"].tolist() == [3]
     assert (floor["vrmse_density"] > 0).all()
     models = pd.read_csv(results / "evaluation" / "models.csv").set_index("model")
@@ -115,10 +116,10 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     assert models["density_in_floors"].notna().all()
     regions = pd.read_csv(results / "evaluation" / "film_unet" / "regions.csv").set_index("region")
     assert regions.loc["all", "samples"] == 2
-    assert regions.loc["campaign: soft_corner", "samples"] == 2
+    assert regions.loc["soft_corner: all", "samples"] == 2
     card = (results / "shipped" / "card.md").read_text()
     assert "| density |" in card
-    assert "campaign: soft_corner" in card
+    assert "soft_corner: all" in card
     shipped = load_file(results / "shipped" / "weights.safetensors")
     assert shipped.keys() == weights.keys()
     fit = json.loads((results / "fits" / "glial_1.json").read_text())

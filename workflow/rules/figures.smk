@@ -4,7 +4,7 @@ FIGURE = f"{RESULTS}/figures/{{figure}}"
 
 
 # Figures that draw tables, by name.
-FIRST = CONFIG.training_campaign or next(iter(CAMPAIGNS))
+FIRST = CONFIG.main_campaign or next(iter(CAMPAIGNS))
 TABLE_FIGURES = {
     "design": dict(
         kind="design",
@@ -50,13 +50,13 @@ if MODELS:
         "bulk": dict(
             kind="bulk",
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
-            options={"campaign": CONFIG.training_campaign},
+            options={"campaign": CONFIG.main_campaign},
         ),
         "training": dict(kind="training", inputs={"history": SURROGATE["history"][0]}),
         "calibration": dict(
             kind="calibration",
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
-            options={"campaign": CONFIG.training_campaign},
+            options={"campaign": CONFIG.main_campaign},
         ),
         "regions": dict(
             kind="regions",
@@ -71,6 +71,10 @@ if MODELS:
             options={"models": list(MODELS)},
         ),
     }
+    if CONFIG.compares_training:
+        TABLE_FIGURES["learning"] = dict(
+            kind="learning", inputs={"table": rules.compare_models.output.campaigns}
+        )
     tuned = [name for name, model in MODELS.items() if model.initial_weights]
     if tuned:
         TABLE_FIGURES["active_learning"] = dict(
@@ -80,7 +84,7 @@ if MODELS:
         )
     samples = {
         "samples": rules.predict_samples.output.samples,
-        "moulds": expand(rules.design_campaign.output.moulds, campaign=TRAINING)[0],
+        "moulds": expand(rules.design_campaign.output.moulds, campaign=MAIN)[0],
     }
     FIELD_FIGURES |= {
         "fields": dict(kind="fields", inputs=samples),

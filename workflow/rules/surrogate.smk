@@ -1,30 +1,33 @@
 """Surrogates: training, and errors on held-out simulations."""
 
-# The campaign by which fields are scaled and models are validated and tested, and those that only test.
-TRAINING = [CONFIG.training_campaign] if MODELS else []
-EVALUATED = [
-    name
-    for name, campaign in CAMPAIGNS.items()
-    if name not in TRAINING and campaign.kind and campaign.tests and not campaign.grid
-]
-REPEATS = [
-    name for name, campaign in CAMPAIGNS.items() if campaign.repeat_of in TRAINING
-]
+# The campaign of figures and baselines, and the repeats of each campaign.
+MAIN = [CONFIG.main_campaign] if MODELS else []
+REPEATS = {
+    name: [other for other, block in CAMPAIGNS.items() if block.repeat_of == name]
+    for name in CAMPAIGNS
+}
 
 
 rule fit_scaling:
-    """Scale fields to [-1, 1] by the training split alone."""
+    """Scale fields to [-1, 1] by the training splits of a model's campaigns."""
     input:
-        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
+        stacks=lambda wildcards: expand(
+            rules.build_stack.output.stack,
+            campaign=CONFIG.origin(wildcards.model).campaigns,
+        ),
     output:
-        normalisation=f"{RESULTS}/surrogate/normalisation.json",
+        normalisation=f"{RESULTS}/surrogate/{{model}}/normalisation.json",
     log:
-        f"{RESULTS}/logs/fit_scaling.log",
+        f"{RESULTS}/logs/fit_scaling/{{model}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/fit_scaling.tsv"
+        f"{RESULTS}/benchmarks/fit_scaling/{{model}}.tsv"
+    wildcard_constraints:
+        model="|".join(MODELS) or "none",
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        fraction=lambda wildcards: CONFIG.origin(wildcards.model).training_fraction,
     script:
         "../scripts/fit_scaling.py"
 
@@ -75,10 +78,13 @@ rule train_member:
 
 
 rule assemble_model:
-    """Assemble the networks of a model, and calibrate its bands on the validation split."""
+    """Assemble the networks of a model, and calibrate its bands on its campaigns' validation splits."""
     input:
-        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
-        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
+        stacks=rules.train_member.input.stacks,
+        moulds=lambda wildcards: expand(
+            rules.design_campaign.output.moulds,
+            campaign=MODELS[wildcards.model].campaigns,
+        ),
         weights=lambda wildcards: expand(
             rules.train_member.output.weights,
             member=range(MODELS[wildcards.model].ensemble_size),
@@ -108,6 +114,7 @@ rule assemble_model:
         mem_mb=2500,
     params:
         seed=CONFIG.seed,
+        fraction=lambda wildcards: MODELS[wildcards.model].training_fraction,
     script:
         "../scripts/assemble_model.py"
 
@@ -126,17 +133,23 @@ rule train:
 
 
 rule measure_floor:
-    """Measure the noise floor: the differences between simulations with different seeds."""
+    """Measure a campaign's noise floor: the differences between simulations with different seeds."""
     input:
-        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
-        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
-        repeats=expand(rules.build_stack.output.stack, campaign=REPEATS),
+        stack=rules.build_stack.output.stack,
+        moulds=rules.design_campaign.output.moulds,
+        repeats=lambda wildcards: expand(
+            rules.build_stack.output.stack, campaign=REPEATS[wildcards.campaign]
+        ),
     output:
-        floor=report(f"{RESULTS}/evaluation/floor.csv", category="Surrogate"),
+        floor=report(
+            f"{RESULTS}/evaluation/floors/{{campaign}}.csv",
+            category="Surrogate",
+            labels={"campaign": "{campaign}", "what": "noise floor"},
+        ),
     log:
-        f"{RESULTS}/logs/measure_floor.log",
+        f"{RESULTS}/logs/measure_floor/{{campaign}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/measure_floor.tsv"
+        f"{RESULTS}/benchmarks/measure_floor/{{campaign}}.tsv"
     threads: 1
     resources:
         mem_mb=1500,
@@ -151,9 +164,9 @@ rule evaluate_model:
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.design_campaign.output.moulds,
-        # A baseline predicts from the training split itself.
-        training=expand(rules.build_stack.output.stack, campaign=TRAINING),
-        examples=expand(rules.list_examples.output.examples, campaign=TRAINING),
+        # A baseline predicts from the training split of the main campaign itself.
+        training=expand(rules.build_stack.output.stack, campaign=MAIN),
+        examples=expand(rules.list_examples.output.examples, campaign=MAIN),
         weights=lambda wildcards: (
             rules.assemble_model.output.weights if wildcards.model in MODELS else []
         ),
@@ -173,14 +186,17 @@ rule evaluate_model:
 
 
 rule summarise_evaluation:
-    """Summarise a model's errors: test split, regions, other campaigns, over the noise floor."""
+    """Summarise a model's errors on the test split of each campaign, by region, over the noise floor."""
     input:
         metrics=lambda wildcards: expand(
             rules.evaluate_model.output.metrics,
-            campaign=[*TRAINING, *(EVALUATED if wildcards.model in MODELS else [])],
+            campaign=CONFIG.tested if wildcards.model in MODELS else MAIN,
             allow_missing=True,
         ),
-        floor=rules.measure_floor.output.floor,
+        floors=expand(
+            rules.measure_floor.output.floor,
+            campaign=[name for name in CONFIG.tested if REPEATS[name]],
+        ),
     output:
         metrics=f"{RESULTS}/evaluation/{{model}}/metrics.csv",
         summary=f"{RESULTS}/evaluation/{{model}}/metrics.json",
@@ -196,6 +212,10 @@ rule summarise_evaluation:
     threads: 1
     resources:
         mem_mb=800,
+    params:
+        campaigns=lambda wildcards: (
+            MODELS[wildcards.model].campaigns if wildcards.model in MODELS else MAIN
+        ),
     script:
         "../scripts/summarise_evaluation.py"
 
@@ -220,6 +240,9 @@ rule compare_models:
         regions=report(
             f"{RESULTS}/evaluation/models_by_region.csv", category="Surrogate"
         ),
+        campaigns=report(
+            f"{RESULTS}/evaluation/models_by_campaign.csv", category="Surrogate"
+        ),
     log:
         f"{RESULTS}/logs/compare_models.log",
     benchmark:
@@ -228,7 +251,7 @@ rule compare_models:
     resources:
         mem_mb=2500,
     params:
-        campaign=CONFIG.training_campaign,
+        campaign=CONFIG.main_campaign,
     script:
         "../scripts/compare_models.py"
 
@@ -236,8 +259,8 @@ rule compare_models:
 rule predict_samples:
     """Predict the held-out samples shown in figures: those with the median and the largest errors."""
     input:
-        stack=expand(rules.build_stack.output.stack, campaign=TRAINING),
-        moulds=expand(rules.design_campaign.output.moulds, campaign=TRAINING),
+        stack=expand(rules.build_stack.output.stack, campaign=MAIN),
+        moulds=expand(rules.design_campaign.output.moulds, campaign=MAIN),
         metrics=ERRORS["metrics"],
         weights=SURROGATE["weights"],
     output:
@@ -273,7 +296,7 @@ rule ship_model:
     params:
         name=CONFIG.name,
         model=CONFIG.surrogate,
-        campaign=CONFIG.training_campaign,
+        campaigns=MODELS[CONFIG.surrogate].campaigns if MODELS else [],
     script:
         "../scripts/ship_model.py"
 
@@ -284,7 +307,6 @@ rule evaluate:
         (
             [
                 rules.compare_models.output,
-                rules.measure_floor.output,
                 rules.ship_model.output.card,
                 *ERRORS.values(),
             ]

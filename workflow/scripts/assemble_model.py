@@ -1,4 +1,4 @@
-"""Assemble the networks of a model, and calibrate them on the validation split."""
+"""Assemble the networks of a model, and calibrate them on its campaigns' validation splits."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,13 +19,14 @@ with logged(snakemake.log[0]):
     folders = [Path(weights).parent for weights in snakemake.input.weights]
     trained = [load(folder) for folder in folders]
     surrogate = replace(trained[0], members=tuple(each.members[0] for each in trained))
-    (stack,), (moulds,) = (map(Path, snakemake.input[name]) for name in ("stack", "moulds"))
-    with progress("calibration", len(read_table(stack).rows("validation"))) as advance:
+    paths = zip(snakemake.input.stacks, snakemake.input.moulds, strict=True)
+    stacks = {Path(stack): moulds_by_id(Path(moulds)) for stack, moulds in paths}
+    with progress("calibration", sum(len(read_table(s).rows("validation")) for s in stacks)) as advance:
         found = calibrate(
             surrogate,
-            stack,
-            moulds_by_id(moulds),
+            stacks,
             snakemake.params.seed,
+            snakemake.params.fraction,
             lambda s: advance(f"simulation {s}"),
         )
     described = [read_description(folder) for folder in folders]

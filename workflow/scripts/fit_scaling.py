@@ -1,4 +1,4 @@
-"""Fit the scaling of fields to the training split of a campaign."""
+"""Fit the scaling of fields to the training splits of a model's campaigns."""
 
 from pathlib import Path
 
@@ -7,5 +7,7 @@ from raptor.dataset.examples import training_scaling
 from raptor.dataset.scaling import write_scaling
 
 with logged(snakemake.log[0]):
-    (stack,) = map(Path, snakemake.input.stack)
-    write_scaling(Path(snakemake.output.normalisation), training_scaling(stack), stack.parent.name)
+    stacks, fraction = [Path(stack) for stack in snakemake.input.stacks], snakemake.params.fraction
+    scaling = training_scaling(*stacks, fraction=fraction)
+    campaigns = [stack.parent.name for stack in stacks]
+    write_scaling(Path(snakemake.output.normalisation), scaling, campaigns, fraction)

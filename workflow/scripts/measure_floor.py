@@ -1,4 +1,4 @@
-"""Measure the seed-to-seed noise of simulations."""
+"""Measure the seed-to-seed noise of a campaign."""
 
 from pathlib import Path
 
@@ -10,11 +10,10 @@ from raptor.moulds import moulds_by_id
 from raptor.studies.evaluation import noise_floor
 
 with logged(snakemake.log[0]):
-    (stack,), (moulds,) = (map(Path, snakemake.input[name]) for name in ("stack", "moulds"))
+    stack, moulds = (Path(snakemake.input[name]) for name in ("stack", "moulds"))
     tables = [
         noise_floor(stack, Path(repeats), moulds_by_id(moulds), snakemake.params.layers)
         for repeats in snakemake.input.repeats
     ]
-    floor = pd.concat(tables) if tables else pd.DataFrame(columns=["simulation", "mould"])
     with atomic_path(Path(snakemake.output.floor)) as path:
-        floor.to_csv(path, index=False)
+        pd.concat(tables).to_csv(path, index=False)

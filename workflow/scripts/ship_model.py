@@ -19,13 +19,14 @@ with logged(snakemake.log[0]):
         description["identity"],
         half=True,
     )
+    summary = read_json(Path(snakemake.input.summary[0]))
     card = model_card(
         snakemake.params.model,
         snakemake.params.name,
         surrogate,
         description["training"],
         pd.read_csv(snakemake.input.history[0]),
-        read_json(Path(snakemake.input.summary[0]))[snakemake.params.campaign],
+        {name: summary[name] for name in snakemake.params.campaigns if name in summary},
         pd.read_csv(snakemake.input.regions[0]),
         half=True,
     )

@@ -1,4 +1,4 @@
-"""Summarise a model's errors: test split, regions of the parameters, other campaigns."""
+"""Summarise a model's errors on each campaign, and by region of the parameters."""
 
 from pathlib import Path
 
@@ -9,12 +9,14 @@ from raptor.core.jobs import logged
 from raptor.studies.evaluation import regions_of, summarise
 
 with logged(snakemake.log[0]):
-    floor = pd.read_csv(snakemake.input.floor)
-    tables = {Path(path).stem: pd.read_csv(path) for path in snakemake.input.metrics}
+    tables, floors = (
+        {Path(path).stem: pd.read_csv(path) for path in snakemake.input[name]}
+        for name in ("metrics", "floors")
+    )
     first = next(iter(tables))
-    summary = {name: summarise(table, floor if name == first else None) for name, table in tables.items()}
+    summary = {name: summarise(table, floors.get(name)) for name, table in tables.items()}
     with atomic_path(Path(snakemake.output.metrics)) as path:
         tables[first].to_csv(path, index=False)
     write_json(Path(snakemake.output.summary), summary)
     with atomic_path(Path(snakemake.output.regions)) as path:
-        regions_of(tables).to_csv(path, index=False)
+        regions_of(tables, snakemake.params.campaigns).to_csv(path, index=False)

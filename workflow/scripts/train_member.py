@@ -8,7 +8,7 @@ from raptor.core.blocks import content_hash
 from raptor.core.device import chosen_device
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
-from raptor.dataset.examples import join_examples, read_examples
+from raptor.dataset.examples import join_examples, read_examples, training_rows
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
 from raptor.surrogate.batches import split_examples
@@ -19,7 +19,7 @@ from raptor.surrogate.training import describe, joined, train
 
 with logged(snakemake.log[0]):
     given, params = dict(snakemake.params.model), snakemake.params
-    campaigns = given.pop("campaigns")
+    campaigns, fraction = given.pop("campaigns"), given.pop("training_fraction")
     rules = ModelRules.model_validate(given)
     stacks, files = ([Path(path) for path in snakemake.input[name]] for name in ("stacks", "examples"))
     begun = Path(snakemake.input.initial[0]).parent if snakemake.input.initial else None
@@ -30,7 +30,8 @@ with logged(snakemake.log[0]):
     data += [str(read_table(stack).parameters) for stack in stacks]
     data += [(begun / "model.json").read_text(encoding="utf-8")] if begun else []
     identity = content_hash([params.identity, params.seed, *data])
-    examples, splits = join_examples(stacks, [read_examples(path) for path in files])
+    runs = {name: len(training_rows(stack, fraction)) for name, stack in zip(campaigns, stacks, strict=True)}
+    examples, splits = join_examples(stacks, [read_examples(path) for path in files], fraction)
     with progress("training", rules.epochs) as advance:
         trained = train(
             *split_examples(stacks, examples, splits, scaling, architecture.pixels),
@@ -48,7 +49,7 @@ with logged(snakemake.log[0]):
     save(
         Path(snakemake.output.weights).parent,
         Surrogate((trained.generator,), architecture, scaling, params.layers, pixels),
-        describe(rules.training(), params.seed, campaigns, rules.initial_weights),
+        describe(rules.training(), params.seed, runs, fraction, rules.initial_weights),
         identity,
     )
     earlier = pd.read_csv(begun / "training.csv") if begun else pd.DataFrame()

@@ -12,7 +12,11 @@ class Model(ModelRules):
     campaigns: tuple[Name, ...] = Field(
         ("paper",),
         min_length=1,
-        description="campaigns whose training runs it is trained on; the first also validates and tests it",
+        description="campaigns whose training runs it is trained on; their validation runs choose its "
+        "weights and calibrate it",
+    )
+    training_fraction: float = Field(
+        1.0, gt=0, le=1, description="share of each campaign's training runs that it is trained on"
     )
 
 

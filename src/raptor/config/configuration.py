@@ -157,8 +157,6 @@ class Configuration(Block):
             )
         if model.lambda_l1 is not None:
             raise ValueError(f"models.{name}.initial_weights: no discriminator is kept; set lambda_l1: null")
-        if model.campaigns[0] != initial.campaigns[0]:
-            raise ValueError(f"models.{name}.campaigns: the first is not that of its initial_weights")
 
     def _order(self) -> None:
         """Check that campaigns and models can be made one after another, without a cycle."""
@@ -179,9 +177,29 @@ class Configuration(Block):
         return self.selected_model or next(iter(self.models), None)
 
     @property
-    def training_campaign(self) -> str | None:
-        """The campaign that scales fields, validates models and tests them; None without models."""
+    def main_campaign(self) -> str | None:
+        """The first campaign of the first model: figures and baselines are of its test runs; None without."""
         return next((model.campaigns[0] for model in self.models.values()), None)
+
+    @property
+    def tested(self) -> list[str]:
+        """Campaigns whose test runs evaluate models: the main one, then the others of random moulds."""
+        others = [
+            name for name, campaign in self.campaigns.items() if campaign.kind and campaign.tests
+            and not campaign.grid and name != self.main_campaign
+        ]  # fmt: skip
+        return [self.main_campaign, *others] if self.main_campaign else []
+
+    @property
+    def compares_training(self) -> bool:
+        """Whether models differ in the data on which they were trained from random weights."""
+        data = {(m.campaigns, m.training_fraction) for m in self.models.values() if not m.initial_weights}
+        return len(data) > 1
+
+    def origin(self, name: str) -> Model:
+        """The model from random weights with which the training of a model began; it scales the fields."""
+        model = self.models[name]
+        return self.origin(model.initial_weights) if model.initial_weights else model
 
     def design(self, campaign: str) -> Design:
         """All that the design of a campaign depends on, apart from other campaigns and models."""

@@ -101,9 +101,8 @@ def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
     stacks = {name: path / "fields.nc" for name, path in campaigns.items()}
     if len(stacks) > 1:
         yield from check_splits({name: path for name, path in stacks.items() if path.is_file()})
-    normalisation = folder / "surrogate" / "normalisation.json"
-    if normalisation.is_file():
-        yield from _check_scaling(normalisation, stacks)
+    for path in sorted(folder.glob("surrogate/*/normalisation.json")):
+        yield from _check_scaling(path, stacks)
 
 
 def check_campaign(folder: Path, fraction: float = 1.0) -> Iterator[str]:
@@ -360,13 +359,15 @@ def check_examples(path: Path, stack: Path) -> Iterator[str]:
 
 
 def _check_scaling(path: Path, stacks: Mapping[str, Path]) -> Iterator[str]:
-    """The constants agree with the training split that they name."""
+    """The constants agree with the training splits that they name."""
+    where = f"{path.parent.name}/{path.name}"
     try:
-        campaign, scaling = read_json(path)["campaign"], read_scaling(path)
-        wanted = training_scaling(stacks[campaign])
+        content, scaling = read_json(path), read_scaling(path)
+        named, fraction = content["campaigns"], content["training_fraction"]
+        wanted = training_scaling(*(stacks[campaign] for campaign in named), fraction=fraction)
     except (KeyError, ValueError, RaptorError) as error:
-        yield f"{path.name}: {error}"
+        yield f"{where}: {error}"
         return
     for ours, theirs in ((scaling.offset, wanted.offset), (scaling.scale, wanted.scale)):
         if not np.allclose(ours, theirs, rtol=1e-6, equal_nan=True):
-            yield f"{path.name}: the constants do not agree with the training split of {campaign}"
+            yield f"{where}: the constants do not agree with the training split of {', '.join(named)}"

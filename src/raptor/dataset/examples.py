@@ -1,6 +1,7 @@
 """Augmentation by D4: the images of samples that are examples for training."""
 
 import csv
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,38 +45,54 @@ def list_examples(stack: Path, splits: Iterable[str] = ("train", "validation")) 
     return examples
 
 
+def training_rows(stack: Path, fraction: float = 1.0) -> list[int]:
+    """Rows of a stack's training split, or the first `fraction` of them.
+
+    Runs are drawn independently, so the first ones are a random sample, and a smaller fraction is part of a
+    larger one.
+    """
+    rows = read_table(stack).rows("train")
+    return rows[: math.ceil(fraction * len(rows))]
+
+
 def join_examples(
-    stacks: Sequence[Path], examples: Sequence[list[Example]]
+    stacks: Sequence[Path], examples: Sequence[list[Example]], fraction: float = 1.0
 ) -> tuple[list[Example], list[str]]:
     """Examples of several stacks as one list, and the splits of all their samples.
 
-    Rows are numbered consecutively through the stacks, as in `ExampleSet`. Only the first stack contributes a
-    validation split.
+    Rows are numbered consecutively through the stacks, as in `ExampleSet`. Of each stack: the examples of
+    `training_rows` and of the validation split.
     """
     joined: list[Example] = []
     splits: list[str] = []
-    for number, (stack, listed) in enumerate(zip(stacks, examples, strict=True)):
-        own = read_table(stack).split
-        chosen = [example for example in listed if number == 0 or own[example.sample] == "train"]
-        joined += [replace(example, sample=len(splits) + example.sample) for example in chosen]
-        splits += own
+    for stack, listed in zip(stacks, examples, strict=True):
+        table = read_table(stack)
+        used = {*training_rows(stack, fraction), *table.rows("validation")}
+        joined += [
+            replace(example, sample=len(splits) + example.sample)
+            for example in listed
+            if example.sample in used
+        ]
+        splits += table.split
     return joined, splits
 
 
-def training_scaling(stack: Path) -> Scaling:
-    """Scaling constants from the stack's training split.
+def training_scaling(*stacks: Path, fraction: float = 1.0) -> Scaling:
+    """Scaling constants from the `training_rows` of stacks.
 
     Raises
     ------
     RaptorError
-        If the stack has no training sample.
+        If the stacks have no training sample.
     """
     low, high = np.full(len(FIELDS), np.inf), np.full(len(FIELDS), -np.inf)
-    for sample in read_samples(stack, read_table(stack).rows("train")):
-        low = np.fmin(low, sample.fields.min(axis=(1, 2)))
-        high = np.fmax(high, sample.fields.max(axis=(1, 2)))
+    for stack in stacks:
+        for sample in read_samples(stack, training_rows(stack, fraction)):
+            low = np.fmin(low, sample.fields.min(axis=(1, 2)))
+            high = np.fmax(high, sample.fields.max(axis=(1, 2)))
     if not np.isfinite(low).all():
-        raise RaptorError(f"{stack} has no training sample; lower the campaign's test or validation")
+        where = ", ".join(map(str, stacks))
+        raise RaptorError(f"{where}: there is no training sample; lower the campaign's test or validation")
     return fit_scaling(low, high)
 
 

@@ -17,16 +17,19 @@ REFERENCES = (
     "Andrews et al., Rapid prediction of organisation in engineered corneal, glial and fibroblast "
     "tissues using machine learning and biophysical models (2025)"
 )
+LICENCE = "CC-BY-4.0"
+LICENCE_URL = "https://creativecommons.org/licenses/by/4.0/"
+"""Of the data and weights that the workflow makes; the code has its own (LICENSE)."""
 
 
 @contextmanager
 def create(path: Path, title: str, configuration: str) -> Iterator[netCDF4.Dataset]:
-    """Create a netCDF-4 file atomically, with the attributes common to all files.
+    """Create a netCDF-4 file of a data set atomically, with the attributes common to all and the licence.
 
     `configuration` is the hash of the configuration block that the file depends on.
     """
     with atomic_path(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
-        file.setncatts(header(title, configuration))
+        file.setncatts(header(title, configuration) | {"license": f"{LICENCE}, {LICENCE_URL}"})
         yield file
 
 

@@ -4,6 +4,7 @@ The scaling commutes with D4: sxsx and sysy share constants, and so do sxsz and 
 are scaled symmetrically about zero.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -81,13 +82,14 @@ def scale_inputs(
     return channels
 
 
-def write_scaling(path: Path, scaling: Scaling, campaign: str) -> None:
-    """Write the constants of a campaign's training split, with the formula and its inverse in words."""
+def write_scaling(path: Path, scaling: Scaling, campaigns: Sequence[str], fraction: float = 1.0) -> None:
+    """Write the constants of campaigns' training splits, with the formula and its inverse in words."""
     content = scaling.as_json() | {
         "formula": "scaled = (value - offset) / scale",
         "inverse": "value = scaled * scale + offset",
-        "from": "the training split alone",
-        "campaign": campaign,
+        "from": "the training splits alone",
+        "campaigns": list(campaigns),
+        "training_fraction": fraction,
     }
     write_json(path, content)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from raptor.core.files import atomic_path
 from raptor.dataset.design import SPLITS
+from raptor.dataset.netcdf import LICENCE, LICENCE_URL
 from raptor.dataset.stack import read_samples, read_table
 from raptor.frame import pixel_centres
 from raptor.parameters import PARAMETERS
@@ -57,6 +58,7 @@ def _describe(file: h5py.File, samples: int, pixels: int) -> None:
     file.attrs.update(
         {
             "dataset_name": "raptor",
+            "license": f"{LICENCE}, {LICENCE_URL}",
             "grid_type": "cartesian",
             "n_spatial_dims": 2,
             "n_trajectories": samples,

@@ -17,6 +17,7 @@ from .drawing import (
 from .evaluation import (
     active_learning_figure,
     calibration_figure,
+    learning_figure,
     models_figure,
     regions_figure,
     training_figure,
@@ -38,6 +39,7 @@ __all__ = [
     "fields_figure",
     "fit_figure",
     "folding_figure",
+    "learning_figure",
     "models_figure",
     "mould_figure",
     "new_figure",

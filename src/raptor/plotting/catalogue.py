@@ -21,6 +21,7 @@ from raptor.plotting.drawing import bulk_figure, design_figure, fields_figure, s
 from raptor.plotting.evaluation import (
     active_learning_figure,
     calibration_figure,
+    learning_figure,
     models_figure,
     regions_figure,
     training_figure,
@@ -212,6 +213,7 @@ FIGURES: dict[str, Callable[..., Drawn]] = {
     "calibration": _calibration,
     "regions": lambda metrics, regions: (regions_figure(metrics, regions), regions),
     "models": _models,
+    "learning": lambda table: (learning_figure(table), table),
     "active_learning": _active_learning,
     "tradeoff": lambda table: (tradeoff_figure(table), table),
     "contraction": lambda table: (contraction_figure(table), table),

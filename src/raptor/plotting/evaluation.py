@@ -221,3 +221,36 @@ def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) ->
     floors.set(ylabel="error / noise floor", yscale="log")
     floors.legend(frameon=False, fontsize=6, ncols=2)
     return figure
+
+
+@STYLED
+def learning_figure(table: pd.DataFrame) -> Figure:
+    """Errors on the test split of each campaign against the number of training runs.
+
+    One line for each set of campaigns trained on from random weights; one row of panels for each of these
+    campaigns; dashed: the noise floor.
+    """
+    names = dict.fromkeys(table["tested_on"])
+    table = table[table["from_random_weights"]].sort_values("training_runs")
+    trained = list(dict.fromkeys(table["trained_on"]))
+    tested = [name for name in names if name in ", ".join(trained).split(", ")]
+    runs = sorted(set(table["training_runs"]))
+    measures = {"vrmse_density": "VRMSE of density", "area_ratio_mae": "mean absolute error of $A/A_0$"}
+    figure = new_figure(8.0, 0.6 + 2.8 * len(tested))
+    grid = cast(Any, figure.subplots(len(tested), len(measures), squeeze=False, sharex=True))
+    for row, campaign in zip(grid, tested, strict=True):
+        for axes, (column, label) in zip(row, measures.items(), strict=True):
+            for data, colour in zip(trained, COLOURS, strict=False):
+                part = table[(table["trained_on"] == data) & (table["tested_on"] == campaign)]
+                axes.plot(part["training_runs"], part[column], "o-", color=colour, label=data)
+            axes.set(xscale="log", ylim=(0, 1.1 * table[column].max()), ylabel=label)
+            axes.set_xticks(runs, [str(number) for number in runs], rotation=60)
+            axes.minorticks_off()
+            axes.set_title(f"tested on {campaign}")
+        floor = table.loc[table["tested_on"] == campaign, "floor"].dropna()
+        if len(floor):
+            row[0].axhline(floor.iloc[0], color=THIRD, ls="--", lw=0.8, label="noise floor")
+        row[0].legend(frameon=False, fontsize=7, title="trained on", title_fontsize=7)
+    for axes in grid[-1]:
+        axes.set(xlabel="training runs")
+    return figure

@@ -24,7 +24,7 @@ def model_card(
     surrogate: "Surrogate",
     training: Mapping[str, Any],
     history: pd.DataFrame,
-    summary: Mapping[str, Any],
+    summaries: Mapping[str, Mapping[str, Any]],
     regions: pd.DataFrame,
     *,
     half: bool,
@@ -39,8 +39,8 @@ def model_card(
         How it was trained, as model.json has it.
     history : DataFrame
         Rows of epochs of all networks.
-    summary, regions : mapping, DataFrame
-        What `evaluation.summarise` gave of the test split, and `evaluation.regions_of`.
+    summaries, regions : mapping, DataFrame
+        What `evaluation.summarise` gave of the test split of each campaign, and `evaluation.regions_of`.
     half : bool
         Whether weights are stored in half precision.
     """
@@ -51,7 +51,7 @@ def model_card(
         "training": training,
         "passes": int(history["epoch"].max()) + 1,
         "minutes": history["seconds"].sum() * training["threads"] / 60,
-        "summary": summary,
+        "summaries": summaries,
         "regions": regions.to_dict("records"),
         "threshold_factor": surrogate.calibration.threshold_factor if surrogate.calibration else 1.0,
         "levels": LEVELS,

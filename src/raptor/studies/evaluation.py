@@ -1,6 +1,6 @@
 """Errors of surrogates on held-out simulations, absolute and relative to the noise floor."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
@@ -209,7 +209,8 @@ def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[
         "bulk": {name: agreement(metrics, name) for name in MEASURES},
         "coverage": {column: float(metrics[column].mean()) for column in covers},
         "unlike": float(metrics["unlike"].mean()) if "unlike" in metrics else None,
-        "in_floors": {} if floor is None or floor.empty else in_floors(metrics, floor),
+        "floor": None if floor is None else float(floor["vrmse_density"].mean()),
+        "in_floors": {} if floor is None else in_floors(metrics, floor),
     }
 
 
@@ -231,11 +232,16 @@ def by_region(metrics: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def regions_of(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Errors of a model by region on the first campaign, then on each other one as a whole."""
-    first, *others = tables.items()
-    wholes = [by_region(table).head(1).assign(region=f"campaign: {name}") for name, table in others]
-    return pd.concat([by_region(first[1]), *wholes], ignore_index=True)
+def regions_of(tables: Mapping[str, pd.DataFrame], trained: Collection[str]) -> pd.DataFrame:
+    """Errors of a model by region on each campaign that it was trained on; on each other one as a whole.
+
+    Regions of the first campaign have plain names, those of others begin with the campaign's.
+    """
+    parts = []
+    for number, (name, table) in enumerate(tables.items()):
+        part = by_region(table) if number == 0 or name in trained else by_region(table).head(1)
+        parts.append(part.assign(region=f"{name}: " + part["region"]) if number else part)
+    return pd.concat(parts, ignore_index=True)
 
 
 def median_and_worst(metrics: pd.DataFrame) -> list[int]:
@@ -308,3 +314,30 @@ def compare(summaries: Mapping[str, Mapping[str, Any]], costs: Iterable[Mapping[
         row |= {f"{name}_in_floors": floors.get(name, np.nan) for name in (*FIELDS, "tether_error", *SHAPES)}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def by_campaign(
+    summaries: Mapping[str, Mapping[str, Any]], trained: Mapping[str, Mapping[str, Any]]
+) -> pd.DataFrame:
+    """Errors of each trained model on the test split of each campaign, with the data it was trained on.
+
+    `floor` is the noise floor of the VRMSE of density. `trained` is the training of each model, as model.json
+    has it.
+    """
+    return pd.DataFrame(
+        {
+            "model": name,
+            "trained_on": ", ".join(training["runs"]),
+            "training_runs": sum(training["runs"].values()),
+            "from_random_weights": training["initial_weights"] is None,
+            "tested_on": campaign,
+            "samples": summary["samples"],
+            "vrmse_density": summary["fields"]["density"]["vrmse"],
+            "floor": summary["floor"],
+            **{f"{shape}_mae": summary["bulk"][shape]["mae"] for shape in SHAPES},
+            "cover95_area_ratio": summary["coverage"]["cover95_area_ratio"],
+            "unlike": summary["unlike"],
+        }
+        for name, training in trained.items()
+        for campaign, summary in summaries[name].items()
+    )

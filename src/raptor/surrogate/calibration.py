@@ -1,6 +1,6 @@
 """Calibration on the validation split: errors as a function of the disagreement of networks."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from raptor.core.errors import RaptorError
+from raptor.dataset.examples import training_rows
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.metrics import without_sign
 from raptor.fields.shape import shape_ratios
@@ -57,35 +58,40 @@ class Case:
 
 def calibrate(
     surrogate: Surrogate,
-    stack: Path,
-    moulds: Mapping[str, Mould],
+    stacks: Mapping[Path, Mapping[str, Mould]],
     seed: int,
+    fraction: float = 1.0,
     on_progress: Callable[[int], None] = lambda simulation: None,
 ) -> Calibration:
-    """The calibration of a surrogate on a stack's validation split.
+    """The calibration of a surrogate on the validation splits of the stacks that it was trained on.
+
+    Parameters
+    ----------
+    stacks : mapping
+        Moulds of each stack, by id.
+    fraction : float
+        Of each training split, as it was trained on.
 
     Raises
     ------
     RaptorError
-        If the stack has no validation sample.
+        If the stacks have no validation sample.
     """
-    table = read_table(stack)
-    rows = table.rows("validation")
-    if not rows:
-        raise RaptorError(f"{stack} has no validation sample; raise design.validation")
-    points = np.stack([_descriptors(sample) for sample in read_samples(stack, table.rows("train"))])
-    training = TrainingSet(points.astype(np.float32))
+    training = TrainingSet(training_points(stacks, fraction))
     pixels: list[NDArray[np.floating]] = []
     cases: list[Case] = []
     disagreements, distances = [], []
-    for sample in read_samples(stack, rows):
-        cast = surrogate.cast(moulds[sample.mould])
+    for number, sample, mould in _validation(stacks):
+        cast = surrogate.cast(mould)
         found = surrogate.ensemble(cast, sample.parameters)
-        pixels.append(_draw_pixels(found, sample, np.random.default_rng([seed, sample.simulation])))
+        pixels.append(_draw_pixels(found, sample, np.random.default_rng([seed, number, sample.simulation])))
         cases.append(Case(cast, shape_ratios(sample.fields[0], cast), found.mean[0], found.densities))
         disagreements.append(disagreement(found.deviation, found.mean))
         distances.append(training.distance(_descriptors(sample)))
         on_progress(sample.simulation)
+    if not cases:
+        where = ", ".join(map(str, stacks))
+        raise RaptorError(f"{where}: there is no validation sample; raise the campaign's validation")
     simulated = density_threshold(surrogate.layers, surrogate.pixels)
     factor = fit_threshold(cases, simulated)
     errors = np.array([case.error(factor * simulated) for case in cases])
@@ -97,6 +103,19 @@ def calibrate(
         TrainingSet(training.points, float(np.quantile(distances, USUAL))),
         factor,
     )
+
+
+def training_points(stacks: Iterable[Path], fraction: float = 1.0) -> NDArray[np.float32]:
+    """Descriptors (n, descriptors) of the training rows of stacks."""
+    read = (read_samples(stack, training_rows(stack, fraction)) for stack in stacks)
+    return np.stack([_descriptors(sample) for samples in read for sample in samples]).astype(np.float32)
+
+
+def _validation(stacks: Mapping[Path, Mapping[str, Mould]]) -> Iterator[tuple[int, Sample, Mould]]:
+    """Validation samples with the numbers of their stacks, and their moulds."""
+    for number, (stack, moulds) in enumerate(stacks.items()):
+        for sample in read_samples(stack, read_table(stack).rows("validation")):
+            yield number, sample, moulds[sample.mould]
 
 
 def _draw_pixels(found: Ensemble, sample: Sample, rng: np.random.Generator) -> NDArray[np.floating]:

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, read_json, write_json
 from raptor.core.version import MODEL_VERSION
+from raptor.dataset.netcdf import LICENCE
 from raptor.dataset.scaling import Scaling
 from raptor.moulds.geometry import CLEARANCE, STRICTLY
 from raptor.surrogate.bands import Calibration
@@ -47,7 +48,7 @@ def save(
         tensors[DESCRIPTORS] = torch.from_numpy(calibration.training.points)
     with atomic_path(folder / WEIGHTS) as temporary:
         contiguous = {name: value.contiguous() for name, value in tensors.items()}
-        save_file(contiguous, temporary, metadata={"identity": identity})
+        save_file(contiguous, temporary, metadata={"identity": identity, "license": LICENCE})
     content = {
         **description,
         "identity": identity,
@@ -57,6 +58,7 @@ def save(
         "layers": surrogate.layers,
         "pixels": surrogate.pixels,
         "model_version": MODEL_VERSION,
+        "license": LICENCE,
         "calibration": None if calibration is None else calibration.as_json(),
     }
     write_json(folder / MODEL, content)

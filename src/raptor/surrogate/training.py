@@ -3,7 +3,7 @@
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -179,11 +179,23 @@ def joined(begun: pd.DataFrame, history: pd.DataFrame) -> pd.DataFrame:
 
 
 def describe(
-    rules: TrainingRules, seed: int, campaigns: Sequence[str] = (), initial_weights: str | None = None
+    rules: TrainingRules,
+    seed: int,
+    runs: Mapping[str, int] | None = None,
+    fraction: float = 1.0,
+    initial_weights: str | None = None,
 ) -> dict[str, Any]:
-    """How a network was trained, for model.json: rules, seed, campaigns, and the model it started from."""
+    """How a network was trained, for model.json: rules, seed, data, and the model it started from.
+
+    `runs` is the number of training runs by campaign, `fraction` its share of the training splits.
+    """
     return {
         "training": rules.model_dump()
-        | {"seed": seed, "campaigns": list(campaigns), "initial_weights": initial_weights},
+        | {
+            "seed": seed,
+            "runs": dict(runs or {}),
+            "training_fraction": fraction,
+            "initial_weights": initial_weights,
+        },
         "torch": torch.__version__,
     }

@@ -14,6 +14,19 @@ TABLE_FIGURES = {
         },
     )
 }
+for campaign, block in CAMPAIGNS.items():
+    if block.kind == "families" or (block.files() and not block.grid):
+        TABLE_FIGURES[f"outcomes_{campaign}"] = dict(
+            kind="outcomes",
+            inputs={
+                name: expand(path, campaign=campaign)[0]
+                for name, path in (
+                    ("simulated", rules.tabulate_campaign.output.table),
+                    ("design", rules.design_campaign.output.design),
+                    ("moulds", rules.design_campaign.output.moulds),
+                )
+            },
+        )
 for campaign in SWEEPS:
     TABLE_FIGURES[f"contraction_{campaign}"] = dict(
         kind="contraction",
@@ -71,6 +84,12 @@ if MODELS:
             options={"models": list(MODELS)},
         ),
     }
+    learnt = [name for name in CONFIG.learnt if CAMPAIGNS[name].selected_by is None]
+    TABLE_FIGURES["descriptors"] = dict(
+        kind="descriptors",
+        inputs={"moulds": expand(rules.design_campaign.output.moulds, campaign=learnt)},
+        options={"mould_scale": CONFIG.mould_scale},
+    )
     if CONFIG.compares_training:
         TABLE_FIGURES["learning"] = dict(
             kind="learning", inputs={"table": rules.compare_models.output.campaigns}
@@ -192,14 +211,14 @@ rule plot_folding:
 
 
 rule studies:
-    """All campaigns over a grid: contraction, simulated and predicted, with figures."""
+    """Campaigns over a grid or of moulds of one's own: what becomes of them, with figures."""
     input:
         expand(rules.tabulate_campaign.output, campaign=SWEEPS),
         expand(rules.compare_contraction.output, campaign=SWEEPS),
         [
             f"{RESULTS}/figures/{figure}.png"
             for figure in (*TABLE_FIGURES, *FIELD_FIGURES)
-            if figure.startswith(("contraction_", "panels_", "directors_"))
+            if figure.startswith(("contraction_", "panels_", "directors_", "outcomes_"))
         ],
 
 

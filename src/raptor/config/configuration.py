@@ -191,6 +191,12 @@ class Configuration(Block):
         return [self.main_campaign, *others] if self.main_campaign else []
 
     @property
+    def learnt(self) -> list[str]:
+        """Campaigns that a model is trained on."""
+        named = {campaign for model in self.models.values() for campaign in model.campaigns}
+        return [name for name in self.campaigns if name in named]
+
+    @property
     def compares_training(self) -> bool:
         """Whether models differ in the data on which they were trained from random weights."""
         data = {(m.campaigns, m.training_fraction) for m in self.models.values() if not m.initial_weights}

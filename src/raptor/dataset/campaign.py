@@ -76,7 +76,8 @@ class Campaign(Block):
         "random",
         min_length=1,
         description="random, families: drawn by random_moulds or mould_families; long_bars, slender_strips: "
-        "drawn unlike the random ones; or library moulds, mould files or folders of them, one or a list",
+        "drawn unlike the random ones; or library moulds, mould files or folders of them, one or a list, "
+        "found beside the configuration, in the working directory or in the library",
     )
     repeat_of: Name | None = Field(
         None, description="campaign whose test runs are simulated again with other seeds: the noise floor"

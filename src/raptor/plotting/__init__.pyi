@@ -1,4 +1,5 @@
 # What the room gives, and where each name lives; `plot` is the front door.
+from .campaigns import descriptors_figure, outcomes_figure
 from .curve import curve_figure
 from .drawing import (
     bulk_figure,
@@ -33,6 +34,7 @@ __all__ = [
     "calibration_figure",
     "contraction_figure",
     "curve_figure",
+    "descriptors_figure",
     "design_figure",
     "directors_figure",
     "draw_mould",
@@ -43,6 +45,7 @@ __all__ = [
     "models_figure",
     "mould_figure",
     "new_figure",
+    "outcomes_figure",
     "panels_figure",
     "plot",
     "regions_figure",

@@ -17,6 +17,7 @@ from raptor.dataset.stack import record_fields
 from raptor.fields.labelled import mould_of
 from raptor.fields.metrics import BULK
 from raptor.moulds import Mould, moulds_by_id
+from raptor.plotting.campaigns import descriptors_figure, outcomes_figure
 from raptor.plotting.drawing import bulk_figure, design_figure, fields_figure, save, tradeoff_figure
 from raptor.plotting.evaluation import (
     active_learning_figure,
@@ -30,6 +31,8 @@ from raptor.plotting.evaluation import (
 from raptor.plotting.fits import fit_figure, valley_figure
 from raptor.plotting.sweep import contraction_figure, directors_figure, panels_figure
 from raptor.raster import density_threshold
+from raptor.studies.coverage import coverage, describe_moulds, known_moulds
+from raptor.studies.outcomes import outcomes
 from raptor.studies.sweep import Panel, middle_points, read_panels
 from raptor.symmetry import FIELDS
 
@@ -74,6 +77,19 @@ def _design(design: pd.DataFrame, moulds: Path) -> Drawn:
     design["symmetry"] = [mould.symmetry for mould in shown]
     design["tethers"] = [len(mould.tethers) for mould in shown]
     return design_figure(design, list(by_id.values())), design
+
+
+def _descriptors(moulds: Sequence[Path], mould_scale: float) -> Drawn:
+    """Of the moulds of campaigns, named by their folders, and of the library."""
+    drawn = {path.parent.name: describe_moulds(moulds_by_id(path).values()) for path in moulds}
+    known = coverage(pd.concat(list(drawn.values())), describe_moulds(known_moulds(mould_scale)))
+    return descriptors_figure(drawn, known), known
+
+
+def _outcomes(simulated: pd.DataFrame, design: pd.DataFrame, moulds: Path) -> Drawn:
+    tethers = pd.Series({name: len(mould.tethers) for name, mould in moulds_by_id(moulds).items()})
+    table = outcomes(simulated, design, tethers)
+    return outcomes_figure(table), table
 
 
 def _bulk(metrics: pd.DataFrame, summary: Mapping[str, Any], campaign: str) -> Drawn:
@@ -208,6 +224,8 @@ def _dataset(stacks: Stacks) -> xr.Dataset:
 
 FIGURES: dict[str, Callable[..., Drawn]] = {
     "design": _design,
+    "descriptors": _descriptors,
+    "outcomes": _outcomes,
     "bulk": _bulk,
     "training": lambda history: (training_figure(history), history),
     "calibration": _calibration,

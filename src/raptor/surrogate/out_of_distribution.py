@@ -41,16 +41,27 @@ DESCRIPTORS = {
     "tether_area": Descriptor("area of all tethers", "l0^2", lambda side: side**2),
     "longest_tether": Descriptor("longest tether", "l0", lambda length: length),
 }
+MOULD_DESCRIPTORS = tuple(DESCRIPTORS)[3:]
+"""Those of the mould alone."""
 
 
 def descriptors(
     depression: NDArray[np.generic], tethers: NDArray[np.generic], parameters: CellParameters
 ) -> NDArray[np.float64]:
-    """Descriptors (`DESCRIPTORS`,) of a mould (masks (y, x)) and its parameters.
+    """Descriptors (`DESCRIPTORS`,) of a mould (masks (y, x)) and its parameters, in parts of their ranges."""
+    values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
+    scaled = [
+        (value - bounds.lower) / (bounds.upper - bounds.lower)
+        for value, bounds in zip(values, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True)
+    ]
+    return np.concatenate([scaled, mould_descriptors(depression, tethers)])
 
-    They are invariant under rotation and reflection. Parameters are over the width of their range, lengths
-    in l0, areas as the side of a square, numbers as their root; slenderness is the logarithm of the ratio of
-    the depression's principal axes, length four standard deviations along the longer.
+
+def mould_descriptors(depression: NDArray[np.generic], tethers: NDArray[np.generic]) -> NDArray[np.float64]:
+    """Descriptors (`MOULD_DESCRIPTORS`,) of a mould (masks (y, x)), invariant under rotation and reflection.
+
+    Lengths in l0, areas as the side of a square, numbers as their root; slenderness is the logarithm of the
+    ratio of the depression's principal axes, length four standard deviations along the longer.
     """
     size = pixel_size(depression.shape[-1])
     short, long = _principal_axes(depression, size)
@@ -58,13 +69,8 @@ def descriptors(
     extents = [
         size * math.hypot(*(part.stop - part.start for part in found)) for found in find_objects(marks)
     ]
-    values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
     return np.array(
         [
-            *(
-                (value - bounds.lower) / (bounds.upper - bounds.lower)
-                for value, bounds in zip(values, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True)
-            ),
             size * math.sqrt(np.count_nonzero(depression)),
             4 * long,
             math.log(long / short),

@@ -19,6 +19,7 @@ import typer
 from PIL import Image
 
 from raptor.cli import app
+from raptor.dataset.publish import publish
 from tests.photograph import CASES
 from tests.small import MINI, ROOT
 
@@ -66,13 +67,21 @@ def made_photograph():
     return CASES[0].made()[2]
 
 
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("published") / "publish"
+    publish(folder, MINI, ["paper"], {}, ROOT)
+    return folder
+
+
 @pytest.fixture
-def desk(tmp_path, monkeypatch, made_photograph):
+def desk(tmp_path, monkeypatch, made_photograph, published):
     """A folder like the project's, with finished runs and a reader's own files."""
     for name in ("config", "workflow", "Snakefile", "src", "pyproject.toml"):
         (tmp_path / name).symlink_to(ROOT / name)
     for name in ("mini", "laptop", "paper"):
         shutil.copytree(MINI, tmp_path / "results" / name)
+    shutil.copytree(published, tmp_path / "results" / "laptop" / "publish")
     shutil.copytree(ROOT / "tests" / "data", tmp_path / "tests" / "data")
     (tmp_path / "docs" / "images").mkdir(parents=True)
     shutil.copy(ROOT / "tests" / "data" / "moulds" / "dog_bone.svg", tmp_path / "mould.svg")
@@ -127,6 +136,9 @@ def test_a_dry_run_finds_its_rules(command, tmp_path):
     for name, text in CONFIGURATIONS.items():
         (tmp_path / f"{name}.yaml").write_text(text)
     shutil.copy(ROOT / "tests" / "data" / "moulds" / "dog_bone.geojson", tmp_path / "my_mould.geojson")
+    shutil.copytree(ROOT / "tests" / "data" / "moulds", tmp_path / "my_moulds")
+    (tmp_path / "my_moulds" / "dog_bone.geojson").unlink()  # drawn in the others too
+    (tmp_path / "my_moulds" / "dog_bone.png").unlink()
     done = subprocess.run(
         [sys.executable, "-m", *command, "--dry-run"],
         cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False,

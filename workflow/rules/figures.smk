@@ -218,7 +218,9 @@ rule studies:
         [
             f"{RESULTS}/figures/{figure}.png"
             for figure in (*TABLE_FIGURES, *FIELD_FIGURES)
-            if figure.startswith(("contraction_", "panels_", "directors_", "outcomes_"))
+            if figure.startswith(
+                ("contraction_", "panels_", "directors_", "outcomes_")
+            )
         ],
 
 

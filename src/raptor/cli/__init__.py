@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from raptor.cli.data import check, progress, reference, same, trace, well
+from raptor.cli.data import check, fetch, progress, reference, same, trace, well
 from raptor.cli.draw import draw
 from raptor.cli.fit import fit
 from raptor.cli.library import moulds, tissues
@@ -30,7 +30,7 @@ Example:
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
     moulds, tissues, draw, simulate, predict, plot, sweep, fit, measure, check, trace, same, progress, well,
-    reference,
+    fetch, reference,
 )  # fmt: skip
 
 

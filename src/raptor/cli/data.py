@@ -1,4 +1,4 @@
-"""Commands on data sets: check, trace, same, progress, well, reference."""
+"""Commands on data sets: check, trace, same, progress, well, fetch, reference."""
 
 from functools import partial
 from pathlib import Path
@@ -37,6 +37,28 @@ def well(
 
     for path in write_well(stack, folder):
         typer.echo(path)
+
+
+def fetch(
+    source: Annotated[str, typer.Argument(help="a published folder: its path, or its http or https address")],
+    output: Annotated[
+        Path | None, typer.Option(help="folder to write in; the source's name in this folder by default")
+    ] = None,
+) -> None:
+    """Bring a published data set here and verify every file; goes on where an earlier call stopped.
+
+    Example:
+      raptor fetch https://example.org/raptor/publish --output raptor_data
+    """
+    from raptor.dataset.fetch import fetch as bring
+
+    folder = output or Path(source.rstrip("/").rsplit("/", 1)[-1] or "raptor_data")
+    if folder.is_file():
+        raise RaptorError(f"{folder} is a file; choose a folder by --output")
+    if folder.resolve() == Path(source).resolve():
+        raise RaptorError(f"{folder} is the source itself; choose another folder by --output")
+    count = bring(source, folder)
+    typer.echo(f"{folder}: {count} files, every checksum right")
 
 
 def check(

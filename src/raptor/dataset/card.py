@@ -11,7 +11,7 @@ import numpy as np
 from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.design import SPLITS, Run
 from raptor.dataset.examples import Example
-from raptor.dataset.netcdf import REFERENCES
+from raptor.dataset.netcdf import LICENCE_URL, REFERENCES
 from raptor.dataset.shards import Shard
 from raptor.dataset.stack import read_table
 from raptor.fields.labelled import LONG_NAMES
@@ -60,7 +60,7 @@ Simulate the moulds of `moulds.geojson` at the parameters of `design.csv`, raste
 with `fields.nc` by VRMSE over the test split. The sign of sxsz and sysz is spontaneous: compare their
 magnitude.
 
-Reference: {references}.
+Licence of the data: [CC BY 4.0]({licence_url}). Reference: {references}.
 """
 
 
@@ -114,6 +114,7 @@ def card(
         inverted=inverted,
         lost=int(np.count_nonzero(table.measures["posts_lost"])),
         references=REFERENCES,
+        licence_url=LICENCE_URL,
     )
 
 

@@ -19,6 +19,7 @@ from raptor.core.files import read_json
 from raptor.dataset.design import Run, read_design
 from raptor.dataset.examples import mould_images, read_examples, training_scaling
 from raptor.dataset.netcdf import open_file
+from raptor.dataset.publish import MANIFEST, check_manifest
 from raptor.dataset.result import CELLS
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.shards import Record, Shard, campaign_folders, read_shard
@@ -96,6 +97,8 @@ def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
 def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
     """Every campaign of a results folder, or the one campaign of its own folder."""
     campaigns = campaign_folders(folder)
+    if (folder / MANIFEST).is_file():
+        yield from check_manifest(folder)
     for name, path in campaigns.items():
         yield from (f"{name}: {fault}" for fault in check_campaign(path, fraction))
     stacks = {name: path / "fields.nc" for name, path in campaigns.items()}

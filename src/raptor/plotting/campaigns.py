@@ -76,15 +76,14 @@ def outcomes_figure(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, len(shown), sharey=True)
     for axes, (column, (label, colours, limits, count)) in zip(panels, shown.items(), strict=True):
         values = table.pivot_table(index="group", columns="delta_from", values=column, dropna=False)
-        counts = table.pivot_table(index="group", columns="delta_from", values=count, dropna=False)
         image = axes.imshow(
             values.reindex(groups), cmap=colours, vmin=limits[0], vmax=limits[1], aspect="auto"
         )
         figure.colorbar(image, ax=axes, label=label)
-        for row, group in enumerate(groups):
-            for place, start in enumerate(values.columns):
-                if (number := counts.at[group, start]) > 0:
-                    axes.text(place, row, f"{number:.0f}", ha="center", va="center", fontsize=5, color="grey")
+        columns = list(values.columns)
+        for group, start, number in zip(table["group"], table["delta_from"], table[count], strict=True):
+            place = columns.index(start), groups.index(group)
+            axes.text(*place, f"{number}", ha="center", va="center", fontsize=5, color="grey")
         ends = table.groupby("delta_from")["delta_to"].first()
         axes.set_xticks(range(len(ends)), [f"{a:g}\N{EN DASH}{b:g}" for a, b in ends.items()], rotation=60)
         axes.set(xlabel=r"$\Delta$")

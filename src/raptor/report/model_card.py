@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from raptor.dataset.netcdf import LICENCE, LICENCE_URL
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
 from raptor.report.html import render
 from raptor.studies.evaluation import SHAPES
@@ -60,5 +61,7 @@ def model_card(
         "kappa_nnn": KAPPA_NNN,
         "kappa_nnnn": KAPPA_NNNN,
         "half": half,
+        "licence": LICENCE,
+        "licence_url": LICENCE_URL,
     }
     return render(TEMPLATE.read_text(encoding="utf-8"), content, escape=False)

@@ -45,7 +45,7 @@ def coverage(drawn: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:
     points, given = drawn[names].to_numpy(), known[names].to_numpy()
     deviation = points.std(axis=0) + 1e-6
     tree = KDTree(points / deviation)
-    among, _ = tree.query(points / deviation, k=2)
+    among = np.asarray(tree.query(points / deviation, k=2)[0])
     nearest, _ = tree.query(given / deviation)
     beyond = (given < points.min(axis=0)) | (given > points.max(axis=0))
     outside = [", ".join(np.array(names)[row]) for row in beyond]

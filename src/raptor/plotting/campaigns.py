@@ -69,8 +69,9 @@ def outcomes_figure(table: pd.DataFrame) -> Figure:
     """
     groups = sorted(set(table["group"]))
     figure = new_figure(11.0, 1.7 + 0.3 * len(groups))
+    most = max(0.1, float(table["losing_posts"].max()))
     shown = {
-        "losing_posts": ("share of tissues that lost a tether", SEQUENTIAL, (0.0, 1.0), "with_tethers"),
+        "losing_posts": ("share of tissues that lost a tether", SEQUENTIAL, (0.0, most), "with_tethers"),
         "area_ratio": ("median $A/A_0$", f"{SEQUENTIAL}_r", (None, None), "simulations"),
     }
     panels = figure.subplots(1, len(shown), sharey=True)
@@ -83,7 +84,7 @@ def outcomes_figure(table: pd.DataFrame) -> Figure:
         columns = list(values.columns)
         for group, start, number in zip(table["group"], table["delta_from"], table[count], strict=True):
             place = columns.index(start), groups.index(group)
-            axes.text(*place, f"{number}", ha="center", va="center", fontsize=5, color="grey")
+            axes.text(*place, f"{number}", ha="center", va="center", fontsize=6, color="white")
         ends = table.groupby("delta_from")["delta_to"].first()
         axes.set_xticks(range(len(ends)), [f"{a:g}\N{EN DASH}{b:g}" for a, b in ends.items()], rotation=60)
         axes.set(xlabel=r"$\Delta$")

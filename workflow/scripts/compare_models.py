@@ -13,10 +13,7 @@ from raptor.surrogate.files import load, read_description
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    summaries = {
-        Path(summary).parent.name: read_json(Path(summary))
-        for summary in snakemake.input.summaries
-    }
+    summaries = {Path(summary).parent.name: read_json(Path(summary)) for summary in snakemake.input.summaries}
     on_main = {name: summary[snakemake.params.campaign] for name, summary in summaries.items()}
     costs: dict[str, dict] = {name: {"model": name} for name in summaries}
     trained: dict[str, dict] = {}

@@ -32,7 +32,7 @@ def costs_of(
         "ensemble_size": len(surrogate.members),
         "weights": surrogate.weights,
         "epochs": int(history["epoch"].max()) + 1,
-        "training_core_minutes": float(history["seconds"].sum() * training["threads"] / 60),
+        "training_core_minutes": float(history["seconds"].sum() * training.get("threads", 1) / 60),
         "one_image_ms": _milliseconds(one, averaged=False),
         "eight_images_ms": _milliseconds(one, averaged=True),
         "all_ms": _milliseconds(surrogate, averaged=True),

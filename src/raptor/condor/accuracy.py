@@ -47,7 +47,7 @@ class Accuracy:
 
 ACCURACIES: dict[str, Accuracy] = {
     # Shortening, sweeps, ftol, ftol of the last step, gradient, evaluations of a step and of the last.
-    "draft": Accuracy("relax", Contraction(1.0, 0, -1.0, -1.0, 0.03, 1500, 1500)),
+    "draft": Accuracy("contract", Contraction(0.3, 5, 2e-2, 2e-3, 0.5, 75, 10000), precision="float32"),
     "standard": Accuracy("contract", Contraction(0.3, 10, 5e-3, 1.5e-4, 0.3, 250, 10000), precision="mixed"),
     "reference": Accuracy(
         "contract", Contraction(0.05, 200, 1e-2, 1e-2, 1e-3, 30000, 30000), hops=5, hop_sweeps=300

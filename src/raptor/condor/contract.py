@@ -38,7 +38,7 @@ class Contraction:
     ----------
     shortening : float
         Largest fraction by which one step shortens a bond's natural length; 1 takes the whole
-        contraction in one step (`relax`).
+        contraction in one step.
     sweeps : int
         Metropolis sweeps of each step before minimisation.
     ftol : float

@@ -14,8 +14,9 @@ from skimage.measure import find_contours
 
 from raptor.core.errors import RaptorError
 from raptor.core.pixels import read_pixels
-from raptor.moulds.drawing import Drawing, Page, Shape
+from raptor.moulds.drawing import Drawing
 from raptor.moulds.geometry import Circle
+from raptor.moulds.shapes import Page, Shape
 
 WHITE = 0.9  # lightness, out of 1, from which a pixel is outside
 TINT = 0.3  # largest difference of green and blue, or excess over red, out of 1

@@ -3,18 +3,13 @@
 Closed lines are shapes; open lines count if several of them close a shape together, as in CAD drawings.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import ceil, floor, log10
 from pathlib import Path
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
@@ -27,70 +22,15 @@ from raptor.moulds.geometry import (
     Tether,
     require_standing,
 )
+from raptor.moulds.lines import GAP, joined, require_closed
+from raptor.moulds.shapes import Line, Page, Shape, are_same
 
 SMALLEST = 0.5  # l0; an outline whose longest side is shorter holds no cell
 ROW = 0.5  # l0; spacing of the rows of sites of all layers, along x and along y
 LARGEST_BLUR = 0.125  # l0; no wall is moved farther than this
 DIGITS = 4  # decimals of a coordinate in l0; drawing programs and renderers round below that
-ROUND = 1e-3  # of its radius: tolerance for a circle
-SAME = 1e-3  # of its area: shapes that differ less are duplicates
-GAP, WIDE_GAP = 2e-4, 0.02  # of the drawing's longest side: ends that meet; ends meant to meet
 PAGE = 0.98  # share of the page's sides covered by a background
-ROLES = {"outline": ("outline", "depression"), "tether": ("tether", "post")}
 FARTHEST = 1e9  # drawing units; larger coordinates are mistakes
-
-
-@dataclass(frozen=True)
-class Page:
-    """The page of a drawing: lower left corner and sides, drawing units, y up."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Its centre."""
-        return self.x + self.width / 2, self.y + self.height / 2
-
-    @property
-    def is_frame(self) -> bool:
-        """Whether it is a square of 62.5 units: drawn in l0."""
-        return bool(np.allclose((self.width, self.height), IMAGE_SIZE, rtol=1e-6))
-
-    def covers(self, shape: shapely.Geometry) -> bool:
-        """Whether a shape lies on it."""
-        sheet = shapely.box(self.x, self.y, self.x + self.width, self.y + self.height)
-        return bool(sheet.buffer(1e-6 * self.width).covers(shape.envelope))
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A closed line of a drawing, in its units, y up; `role` is "outline", "tether" or ""."""
-
-    name: str
-    polygon: shapely.Polygon
-    role: str = ""
-
-    @property
-    def size(self) -> float:
-        """Area of its convex hull, which a shape that crosses itself has too."""
-        return float(self.polygon.convex_hull.area)
-
-    @cached_property
-    def tether(self) -> Tether:
-        """The shape as a tether; drawn circles stay circles."""
-        return circle_of(self.polygon) or PolygonTether(self.polygon)
-
-
-@dataclass(frozen=True)
-class Line:
-    """An open line of a drawing: corners (n, 2)."""
-
-    name: str
-    corners: NDArray[np.float64]
-    role: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,11 +39,21 @@ class Drawing:
 
     Parameters
     ----------
-    shapes : tuple of Shape lines : tuple of Line page : Page or None None if the file does not give the size
-    of its page. unit : str Name of a drawing unit in messages. mm : float or None Millimetres per unit, if
-    the file has a real unit. l0 : float or None l0 per unit, if the file states it. framed : bool Whether
-    the page is the frame. blur : float Precision of walls, drawing units. A corner nearer than this to a row
-    of sites is moved onto it, so that noise does not decide about a whole row.
+    shapes : tuple of Shape
+    lines : tuple of Line
+    page : Page or None
+        None if the file does not give the size of its page.
+    unit : str
+        Name of a drawing unit in messages.
+    mm : float or None
+        Millimetres per unit, if the file has a real unit.
+    l0 : float or None
+        l0 per unit, if the file states it.
+    framed : bool
+        Whether the page is the frame.
+    blur : float
+        Precision of walls, drawing units. A corner nearer than this to a row of sites is moved onto it, so
+        that noise does not decide about a whole row.
     """
 
     shapes: tuple[Shape, ...]
@@ -124,8 +74,9 @@ class Drawing:
 
         Raises
         ------
-        RaptorError If there is no outline or several, or the mould cannot be cast; the message names a scale
-        that fits.
+        RaptorError
+            If there is no outline or several, or the mould cannot be cast; the message names a scale that
+            fits.
         """
         try:
             outline, tethers = _told_apart(self._closed(), self.page)
@@ -154,10 +105,10 @@ class Drawing:
         longest = float(np.ptp(everything, axis=0).max()) if everything.size else 0.0
         if self.lines:
             closed += joined(self.lines, GAP * longest)
-            _require_closed(self.lines, closed, longest)
+            require_closed(self.lines, closed, longest)
         kept: list[Shape] = []
         for shape in sorted(closed, key=lambda shape: shape.role == ""):  # of duplicates, one with a role
-            if not any(_same(shape, other) for other in kept):
+            if not any(are_same(shape, other) for other in kept):
                 kept.append(shape)
         chosen = {id(shape) for shape in kept}
         return [shape for shape in closed if id(shape) in chosen]
@@ -218,59 +169,6 @@ class Placement:
         return f"fitted to the frame at {said} (overrule by --scale)" if self.fitted else said
 
 
-def role_of(*words: str) -> str:
-    """The role in a name: "outline", "tether" or ""."""
-    for word in words:
-        for role, beginnings in ROLES.items():
-            if word.strip().lower().startswith(beginnings):
-                return role
-    return ""
-
-
-def circle_of(polygon: shapely.Polygon) -> Circle | None:
-    """The circle drawn by a polygon of many corners, if any."""
-    corners = shapely.get_coordinates(polygon.exterior)
-    if len(corners) < 16 or polygon.interiors or not polygon.is_valid:
-        return None
-    x0, y0, x1, y1 = polygon.bounds
-    x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    reach = np.hypot(corners[:, 0] - x, corners[:, 1] - y)
-    radius = float((reach.max() + reach.min()) / 2)
-    steps = np.hypot(*np.diff(corners, axis=0).T)
-    if np.ptp(reach) > 2 * ROUND * radius or steps.max() > 0.5 * radius:
-        return None
-    return Circle(x, y, radius)
-
-
-def joined(lines: Sequence[Line], gap: float) -> list[Shape]:
-    """The shapes closed by open lines whose ends lie within `gap` of each other."""
-    ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
-    knots = _knots(ends, gap)
-    met: dict[bytes, tuple[Line, shapely.LineString]] = {}
-    for number, line in enumerate(lines):
-        corners = line.corners.copy()
-        corners[0], corners[-1] = knots[2 * number], knots[2 * number + 1]
-        path = shapely.LineString(corners)
-        if path.length > 0:
-            met.setdefault(path.normalize().wkb, (line, path))  # duplicates count once
-    shapes = []
-    for polygon in shapely.get_parts(shapely.polygonize([path for _, path in met.values()])):
-        rim = polygon.exterior.buffer(1e-6 * polygon.length)
-        around = [line for line, path in met.values() if rim.covers(path)]
-        role = next((line.role for line in around if line.role), "")
-        shapes.append(Shape(around[0].name, shapely.Polygon(polygon.exterior), role))
-    return shapes
-
-
-def _knots(ends: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
-    """Ends of lines (n, 2), each moved to the mean of those within `gap` of it."""
-    pairs = KDTree(ends).query_pairs(gap, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends),) * 2)
-    _, knot = connected_components(links, directed=False)
-    middles = np.column_stack([np.bincount(knot, ends[:, axis]) for axis in (0, 1)])
-    return np.asarray((middles / np.bincount(knot)[:, None])[knot])
-
-
 def rounded(value: float, up: bool = False) -> str:
     """A positive number rounded down to three digits, or up with `up`."""
     step = 10.0 ** (floor(log10(value)) - 2)
@@ -322,15 +220,6 @@ def _require_no_background(outline: Shape, others: list[Shape], page: Page | Non
         )
 
 
-def _same(shape: Shape, other: Shape) -> bool:
-    """Whether two shapes are duplicates."""
-    first, second = shape.polygon, other.polygon
-    near = np.abs(np.subtract(first.bounds, second.bounds)).max() <= SAME * np.sqrt(shape.size)
-    if not near or not (first.is_valid and second.is_valid):
-        return bool(near and first.equals(second))
-    return bool(first.symmetric_difference(second).area <= SAME * first.area)
-
-
 def _placed(shape: Tether, placement: Placement, blur: float) -> Tether:
     """A shape in l0, rounded to the significant digits."""
     moved = _on_rows(shape.shifted(-placement.x, -placement.y).scaled(placement.scale), blur)
@@ -355,38 +244,6 @@ def _require_wide(tether: Tether, name: str, placement: Placement, outline: shap
         f"tether {name} is too thin to hold cells back: {2 * half:.2g} l0 across at "
         f"{placement.scale:.4g} l0 per unit, {2 * SMALLEST_TETHER} are needed; {advice}"
     )
-
-
-def _require_closed(lines: Sequence[Line], closed: Sequence[Shape], longest: float) -> None:
-    """Raise a RaptorError if lines nearly close an outline, or one of that name is open."""
-    if any(shape.role == "outline" for shape in closed):
-        return
-    nearly = [
-        shape
-        for shape in joined(lines, WIDE_GAP * longest)
-        if not any(_same(shape, other) for other in closed)
-        and all(shape.polygon.envelope.covers(other.polygon) for other in closed)
-    ]
-    called = [line for line in lines if line.role == "outline"]
-    if nearly or called or not closed:
-        name = (called or nearly or lines)[0].name
-        raise RaptorError(f"no line closes an outline: {_gap(lines, longest) or f'{name} is open'}; close it")
-
-
-def _gap(lines: Sequence[Line], longest: float) -> str | None:
-    """The widest gap between two ends meant to meet, for messages."""
-    ends = np.array([end for line in lines for end in (line.corners[0], line.corners[-1])])
-    tree = KDTree(ends)
-    meet = {int(end) for pair in tree.query_pairs(GAP * longest) for end in pair}
-    gaps = [
-        (float(np.hypot(*(ends[i] - ends[j]))), i, j)
-        for i, j in tree.query_pairs(WIDE_GAP * longest)
-        if not {i, j} & meet
-    ]
-    if not gaps:
-        return None
-    width, i, j = max(gaps)
-    return f"{lines[i // 2].name} and {lines[j // 2].name} end {width:.3g} apart"
 
 
 def _on_rows(shape: Tether, blur: float) -> Tether:

@@ -29,7 +29,8 @@ from ezdxf.units import conversion_factor
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import kind_of, read_input
-from raptor.moulds.drawing import Drawing, Line, Shape, role_of
+from raptor.moulds.drawing import Drawing
+from raptor.moulds.shapes import Line, Shape, role_of
 
 # ezdxf reports damage by many kinds of exceptions.
 DAMAGE = (

@@ -14,9 +14,10 @@ import shapely
 
 from raptor.core.errors import RaptorError
 from raptor.frame import IMAGE_SIZE
-from raptor.moulds.drawing import SMALLEST, Drawing, Line, Page, Shape, role_of
+from raptor.moulds.drawing import SMALLEST, Drawing
 from raptor.moulds.geojson import from_feature, polygon_of, read_features, tethers_of
 from raptor.moulds.geometry import Circle, Mould
+from raptor.moulds.shapes import Line, Page, Shape, role_of
 
 FRAME = Page(-IMAGE_SIZE / 2, -IMAGE_SIZE / 2, IMAGE_SIZE, IMAGE_SIZE)
 DAMAGE = (

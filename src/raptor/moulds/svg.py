@@ -21,9 +21,10 @@ import svgelements
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import decoded, kind_of, read_input
-from raptor.moulds.drawing import Drawing, Line, Page, Shape, circle_of, role_of
+from raptor.moulds.drawing import Drawing
 from raptor.moulds.geometry import CIRCLE_SEGMENTS
 from raptor.moulds.rendering import SHAPES, Drawn, drawn_shapes, tag_of
+from raptor.moulds.shapes import Line, Page, Shape, circle_of, role_of
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 SMOOTH = 1e-4  # of a shape's longer side: largest distance of a straightened curve from the drawn one

@@ -282,7 +282,7 @@ def test_what_a_measurement_leaves_is_that_of_normal_theory():
     assert left == pytest.approx([np.sqrt(0.5), 1], abs=0.05)
 
 
-def test_further_measurements_are_ranked_by_what_they_leave():
+def test_measurements_are_ranked_by_what_they_leave():
     posterior = infer(surveyed(), Target(*smooth([TRUTH])[0]), seed=0, dense=2**13)
     nothing = Sampled(np.empty((0, 3)), pd.DataFrame(columns=[*SEEN, "thickness"]))
     table = rank_measurements(posterior, nothing, Target(*smooth([TRUTH])[0]), 0)
@@ -306,7 +306,7 @@ def test_simulated_draws_tell_thickness_and_errors():
 
 def test_simulations_again_have_seeds_of_their_own():
     simulator = Simulator(NetworkModel(2), "draft", 64, 5)
-    runs = [simulator.run(BOX, TRUTH, further) for further in (1, 2)]
+    runs = simulator.replicates(BOX, TRUTH, 2)
     target = Target(0.7, 0.7)
     again = measure_again(runs, simulator, BOX, target)
     assert again["area_ratio_std"] > 0

@@ -47,7 +47,7 @@ def swept():
         {
             "delta": [0.2, 0.9, 0.95], "kappa_nnn": 0.1, "ratio": 0.1, "area_ratio": [0.86, 0.4, 0.4],
             "width_ratio": [0.6, 0.3, 0.3], "area_ratio_band95": 0.05, "width_ratio_band95": 0.2,
-            "unlike": [False, True, True],
+            "out_of_distribution": [False, True, True],
         }
     )  # fmt: skip
     return contraction(*(table.assign(mould="one") for table in (simulated, predicted)))

@@ -131,8 +131,8 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
     for parameter in posterior["parameters"].values():
         assert parameter["quantiles"]["0.025"] <= parameter["mean"] <= parameter["quantiles"]["0.975"]
     assert len(pd.read_csv(results / "fits" / "glial_1_draws.csv")) == 8
-    further = pd.read_csv(results / "fits" / "glial_1_further.csv")
-    assert {"outline", "alignment", "tension", "thickness"} <= set(further["measurement"])
+    ranked = pd.read_csv(results / "fits" / "glial_1_experimental_design.csv")
+    assert {"outline", "alignment", "tension", "thickness"} <= set(ranked["measurement"])
     outline = json.loads((results / "fits" / "glial_1_outline.json").read_text())
     assert outline["outline"]["distance"] >= 0
     table = pd.read_csv(results / "fits" / "fits.csv").set_index("tissue")

@@ -121,7 +121,7 @@ for tissue in TISSUES:
                 ("posterior", inferred.posterior),
                 ("points", inferred.points),
                 ("draws", inferred.draws),
-                ("further", inferred.further),
+                ("experimental_design", inferred.experimental_design),
             )
         },
     )

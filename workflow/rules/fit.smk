@@ -60,7 +60,7 @@ rule fit_by_simulator:
 
 
 rule infer_parameters:
-    """Infer the posterior of a tissue's parameters, and rank further measurements."""
+    """Infer the posterior of a tissue's parameters, and rank measurements that would narrow it."""
     input:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,
@@ -70,10 +70,10 @@ rule infer_parameters:
         posterior=f"{RESULTS}/fits/{{tissue}}_posterior.json",
         points=f"{RESULTS}/fits/{{tissue}}_points.csv",
         draws=f"{RESULTS}/fits/{{tissue}}_draws.csv",
-        further=report(
-            f"{RESULTS}/fits/{{tissue}}_further.csv",
+        experimental_design=report(
+            f"{RESULTS}/fits/{{tissue}}_experimental_design.csv",
             category="Fits",
-            labels={"tissue": "{tissue}", "what": "further measurements"},
+            labels={"tissue": "{tissue}", "what": "experimental design"},
         ),
     log:
         f"{RESULTS}/logs/infer_parameters/{{tissue}}.log",

@@ -9,7 +9,7 @@ from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.shards import write_shard
 from raptor.fitting import Fit, Simulator, Target, descend_by_simulation, measure_again, unit_of, write_fit
-from raptor.fitting.simulator import REPEATS
+from raptor.fitting.simulator import REPLICATES
 from raptor.moulds.reading import read_at_scale
 from raptor.parameters import CellParameters
 
@@ -22,7 +22,7 @@ with logged(snakemake.log[0]):
     measure, begun = simulator.measure(mould), perf_counter()
     fitted = Fit.at(descend_by_simulation(measure, target.residuals, start, params.simulations))
     seconds = perf_counter() - begun
-    runs = [simulator.run(mould, fitted.parameters, further) for further in range(1, REPEATS + 1)]
+    runs = simulator.replicates(mould, fitted.parameters, REPLICATES)
     first = Run(0, mould.name, "test", fitted.parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)
     write_shard(path, [first], {0: runs[0]}, simulator.model, simulator.accuracy, params.configuration)

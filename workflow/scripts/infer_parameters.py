@@ -1,4 +1,4 @@
-"""Infer the posterior of a tissue's parameters, and rank further measurements."""
+"""Infer the posterior of a tissue's parameters, and rank measurements that would narrow it."""
 
 from pathlib import Path
 
@@ -24,8 +24,8 @@ with logged(snakemake.log[0]), progress("draws", DRAWS) as advance:
     drawn = posterior.draws(1000, simulator.seed)
     columns = np.column_stack([posterior.parameters[drawn], posterior.values[drawn]])
     points = pd.DataFrame(columns, columns=[*PARAMETERS, *posterior.names])
-    further = rank_measurements(posterior, sampled, target, simulator.seed)
-    tables = {"points": points, "draws": sampled.table, "further": further}
+    ranked = rank_measurements(posterior, sampled, target, simulator.seed)
+    tables = {"points": points, "draws": sampled.table, "experimental_design": ranked}
     for name, table in tables.items():
         with atomic_path(Path(snakemake.output[name])) as path:
             table.to_csv(path, index=False)

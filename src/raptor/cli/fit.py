@@ -11,22 +11,33 @@ from raptor.cli import options as opt
 By = Literal["surrogate", "simulator"]
 
 
+AreaRatio = Annotated[float | None, typer.Option(help="measured A/A0")]
+WidthRatio = Annotated[float | None, typer.Option(help="measured w/w0 (central width)")]
+Tissue = Annotated[str | None, typer.Option(help="use the measured ratios of this tissue")]
+Outline = Annotated[
+    Path | None,
+    typer.Option(help="picture of the tissue, or a mask, cropped to the frame of 62.5 l0 about the mould"),
+]
+Model = Annotated[By, typer.Option(help="fit by the surrogate alone, or continue with the simulator")]
+Layers = Annotated[int | None, typer.Option(help="cell layers of simulations [those of the surrogate]")]
+Accuracy = Annotated[str, typer.Option(help="accuracy of simulations: draft, standard or reference")]
+Simulations = Annotated[int, typer.Option(min=1, help="largest number of simulations")]
+Error = Annotated[
+    float | None, typer.Option(help="standard error of a ratio [0.01], or of the outline in l0 [0.25]")
+]
+Seed = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="seed of every random number")]
+Picture = Annotated[Path | None, typer.Option(help="picture of the fitted tissue to write (PNG or SVG)")]
+
+
 def fit(
     mould: opt.Mould,
     output: Annotated[Path, typer.Option(help="JSON file to write")],
-    area_ratio: Annotated[float | None, typer.Option(help="measured A/A0")] = None,
-    width_ratio: Annotated[float | None, typer.Option(help="measured w/w0 (central width)")] = None,
-    tissue: Annotated[str | None, typer.Option(help="use the measured ratios of this tissue")] = None,
+    area_ratio: AreaRatio = None,
+    width_ratio: WidthRatio = None,
+    tissue: Tissue = None,
     tissues: opt.Tissues = None,
-    outline: Annotated[
-        Path | None,
-        typer.Option(
-            help="picture of the tissue, or a mask, cropped to the frame of 62.5 l0 about the mould"
-        ),
-    ] = None,
-    by: Annotated[
-        By, typer.Option(help="fit by the surrogate alone, or continue with the simulator")
-    ] = "surrogate",
+    outline: Outline = None,
+    by: Model = "surrogate",
     model: opt.Surrogate = None,
     delta: opt.Delta = None,
     kappa_nnn: opt.KappaNNN = None,
@@ -34,21 +45,12 @@ def fit(
     scale: opt.Scale = None,
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
-    layers: Annotated[
-        int | None, typer.Option(help="cell layers of simulations [those of the surrogate]")
-    ] = None,
-    accuracy: Annotated[
-        str, typer.Option(help="accuracy of simulations: draft, standard or reference")
-    ] = "standard",
-    simulations: Annotated[int, typer.Option(min=1, help="largest number of simulations")] = 40,
-    error: Annotated[
-        float | None,
-        typer.Option(help="standard error of a ratio [0.01], or of the outline in l0 [0.25]"),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="seed of every random number")] = 0,
-    picture: Annotated[
-        Path | None, typer.Option(help="picture of the fitted tissue to write (PNG or SVG)")
-    ] = None,
+    layers: Layers = None,
+    accuracy: Accuracy = "standard",
+    simulations: Simulations = 40,
+    error: Error = None,
+    seed: Seed = 0,
+    picture: Picture = None,
     as_json: opt.Json = False,
 ) -> None:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.

@@ -57,7 +57,7 @@ class Tissue:
     energy, wall_energy, contact_energy : float
         Of the bonds, of the walls, and of the contacts that keep bonds from reversing, kappa0 l0^2.
         Where the last is not zero, the state is a minimum with those contacts, not without.
-    gradient : float
+    residual_gradient : float
         Largest component of the gradient, contacts included, by position or by orientation
         over Delta (at least 0.02), kappa0 l0.
     converged : bool
@@ -82,7 +82,7 @@ class Tissue:
     energy: float
     wall_energy: float
     contact_energy: float
-    gradient: float
+    residual_gradient: float
     converged: bool
     inverted_fraction: float
     gradient_evaluations: int
@@ -237,8 +237,14 @@ def simulate(
     model = layers if isinstance(layers, NetworkModel) else NetworkModel(layers)
     if seed < 0:
         raise RaptorError(f"seed is {seed}; give a whole number, 0 or more")
-    if isinstance(accuracy, str):
-        accuracy = accuracy_named(accuracy)
+    known = accuracy_named(accuracy) if isinstance(accuracy, str) else accuracy
+    return _contracted(mould, cells, model, known, seed)
+
+
+def _contracted(
+    mould: Mould, cells: CellParameters, model: NetworkModel, accuracy: Accuracy, seed: int
+) -> Tissue:
+    """The tissue of a cast mould, of arguments that are allowed."""
     started = time.perf_counter()
     rng = np.random.default_rng(seed)
     mixed = accuracy.precision == "mixed"
@@ -265,7 +271,7 @@ def simulate(
         energy=minimum.energy,
         wall_energy=minimum.wall_energy - touching,
         contact_energy=touching,
-        gradient=minimum.residual_gradient,
+        residual_gradient=minimum.residual_gradient,
         converged=minimum.converged and accuracy.minimised,
         inverted_fraction=inverted_fraction(state, lattice),
         gradient_evaluations=minimum.evaluations,

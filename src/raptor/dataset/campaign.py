@@ -20,9 +20,9 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.design import Run
 from raptor.moulds.families import MouldFamilies
 from raptor.moulds.geometry import Mould
+from raptor.moulds.out_of_distribution import long_bars, slender_strips
 from raptor.moulds.random_moulds import RandomMoulds
 from raptor.moulds.reading import SUFFIXES, find_mould, read_at_scale
-from raptor.moulds.unlike import long_bars, slender_strips
 from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
 
 DRAWN: dict[str, Callable[[Any, np.random.Generator, int, str], Mould]] = {

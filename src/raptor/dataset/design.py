@@ -37,8 +37,8 @@ def write_design(path: Path, runs: Sequence[Run]) -> None:
         for run in runs:
             p = run.parameters
             numbers = (repr(value) for value in (p.delta, p.kappa_nnn, p.kappa_nnnn))
-            further = (run.own.get(name, "") for name in own)
-            writer.writerow((run.simulation, run.mould, run.split, *numbers, run.seed, *further))
+            notes = (run.own.get(name, "") for name in own)
+            writer.writerow((run.simulation, run.mould, run.split, *numbers, run.seed, *notes))
 
 
 def read_design(path: Path) -> list[Run]:
@@ -63,9 +63,8 @@ def read_design(path: Path) -> list[Run]:
 
 
 def _run(row: list[str], own: list[str]) -> Run:
-    simulation, mould, split, delta, kappa_nnn, kappa_nnnn, seed, *further = row
+    simulation, mould, split, delta, kappa_nnn, kappa_nnnn, seed, *notes = row
     if split not in SPLITS:
         raise ValueError(f"split is '{split}'; allowed are {', '.join(SPLITS)}")
     parameters = CellParameters(float(delta), float(kappa_nnn), float(kappa_nnnn))
-    notes = dict(zip(own, further, strict=True))
-    return Run(int(simulation), mould, split, parameters, int(seed), notes)
+    return Run(int(simulation), mould, split, parameters, int(seed), dict(zip(own, notes, strict=True)))

@@ -31,6 +31,9 @@ RESULTS = {
     "gradient_evaluations": "evaluations of energy and gradient",
     "sweeps": "sweeps of annealing",
 }
+ATTRIBUTES = {"gradient": "residual_gradient"}
+"""Attributes of a `Tissue` whose names are not those of `RESULTS`."""
+
 MOVE_AWAY = "move it to another folder, and the workflow makes it again"
 CELL_VARIABLES = {
     "x0": "cast position x, in l0", "y0": "cast position y, in l0", "z0": "cast position z, in l0",
@@ -134,7 +137,7 @@ def write_simulations(file: netCDF4.Dataset, runs: Sequence[Run], simulations: S
         values = np.array([getattr(run.parameters, name) for run in runs])
         variable(file, name, along, values, long_name)
     for name, long_name in RESULTS.items():
-        values = np.array([getattr(s, name) for s in simulations])
+        values = np.array([getattr(s, ATTRIBUTES.get(name, name)) for s in simulations])
         if values.dtype.kind in "bi":
             values = values.astype(np.int8 if name == "converged" else np.int32)
         variable(file, name, along, values, long_name)

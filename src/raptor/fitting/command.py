@@ -128,10 +128,8 @@ def fit(
         A surrogate or its folder; None for the shipped one.
     start : CellParameters, optional
         Start of a fit by the simulator without a surrogate.
-    layers : int, optional
-        Cell layers of simulations; by default those of the surrogate, or 7 without one.
-    accuracy : str
-        Of simulations, as in `simulate`.
+    layers, accuracy : int, str
+        Of simulations, as in `simulate`; by default the surrogate's layers, or 7 without one.
     simulations : int
         Largest number of simulations.
     error : float, optional
@@ -148,27 +146,34 @@ def fit(
     --------
     >>> found = fit("glial_1", area_ratio=0.81, width_ratio=0.80)
     """
+    start = _start(start, by)
+    target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
+    used = _surrogate(surrogate, layers) if start is None else None
+    model = NetworkModel(used.layers if used is not None else layers or 7)
+    simulator = Simulator(model, accuracy, used.pixels if used is not None else PIXELS, seed)
+    return _fit(Request(mould, target, simulator, used, start, by == "simulator", simulations, error))
+
+
+def _start(start: CellParameters | None, by: str) -> CellParameters | None:
+    """The start of a fit by the simulator alone, checked."""
     if by not in get_args(By):
         raise RaptorError(f"by is '{by}'; allowed are {', '.join(get_args(By))}")
-    if start is not None:
-        if by == "surrogate":
-            raise RaptorError(
-                'start parameters need a fit by the simulator: by="simulator", or --by simulator'
-            )
-        start = require_parameters(start).require_sampled("fit")
-    target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
-    if start is not None:
-        surrogate = None
-    elif not isinstance(surrogate, Surrogate):
-        surrogate = load_surrogate(surrogate)
-    if surrogate is not None and layers not in (None, surrogate.layers):
+    if start is None:
+        return None
+    if by == "surrogate":
+        raise RaptorError('start parameters need a fit by the simulator: by="simulator", or --by simulator')
+    return require_parameters(start).require_sampled("fit")
+
+
+def _surrogate(surrogate: Surrogate | str | Path | None, layers: int | None) -> Surrogate:
+    """The surrogate, loaded, and for as many layers as are asked for."""
+    loaded = surrogate if isinstance(surrogate, Surrogate) else load_surrogate(surrogate)
+    if layers not in (None, loaded.layers):
         raise RaptorError(
-            f"layers is {layers}, but this surrogate is for {surrogate.layers}; omit it, or start the "
+            f"layers is {layers}, but this surrogate is for {loaded.layers}; omit it, or start the "
             "simulator from your own parameters"
         )
-    model = NetworkModel(surrogate.layers if surrogate is not None else layers or 7)
-    simulator = Simulator(model, accuracy, surrogate.pixels if surrogate else PIXELS, seed)
-    return _fit(Request(mould, target, simulator, surrogate, start, by == "simulator", simulations, error))
+    return loaded
 
 
 def _target(

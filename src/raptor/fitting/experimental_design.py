@@ -1,4 +1,4 @@
-"""Experimental design: the further measurement that would narrow the posterior most.
+"""Experimental design: the measurement that would narrow the posterior most.
 
 For each candidate, hypothetical tissues are drawn from the posterior and measured with an error, and the
 posterior is reweighted with each of these measurements; the remaining variances of the parameters, averaged
@@ -66,7 +66,7 @@ def simulate_draws(
 
 
 def rank_measurements(posterior: Posterior, sampled: Sampled, target: Target, seed: int) -> pd.DataFrame:
-    """Candidates for a further measurement, the most informative first.
+    """Candidates for the next measurement, the most informative first.
 
     Columns `left_{parameter}` and `left` (root mean square over parameters) are standard deviations expected
     after the measurement, over those before it; `measurement_error` and `model_error` are the assumed errors;

@@ -1,4 +1,4 @@
-"""Further measurements on a tissue, beyond its area and central width, with their standard errors.
+"""Measurements on a tissue beyond its area and central width, with their standard errors.
 
 The errors are assumptions, to be replaced by a laboratory's own: of ratios as for A/A0, of mean orientation
 as from polarised light or a stained section, of tension a tenth of its value (its unit, kappa0 l0, must be
@@ -25,7 +25,7 @@ SEEN = (*RATIOS, *WIDTHS, "alignment", "upright", "tension")
 
 @dataclass(frozen=True)
 class Candidate:
-    """A further measurement.
+    """A measurement that could be made.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from raptor.raster import rasterise
 
 STEP = 0.06  # of a finite difference, over a bound's width: ratios change by ten times their noise
 RESTART = 5  # evaluations needed to make a step from another start
-REPEATS = 4  # simulations with new seeds to verify a fit
+REPLICATES = 4  # simulations with new seeds to verify a fit
 ENOUGH = 1e-5  # residual sum of squares due to a seed-to-seed noise of 0.003
 
 
@@ -53,13 +53,17 @@ class Simulator:
         model = NetworkModel(content["layers"], tuple(content["shells"]), content["tension"])
         return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
 
-    def seed_of(self, further: int) -> int:
-        """The seed of fits (0) or the nth further one."""
-        return (self.seed + further) % 2**31
+    def seed_of(self, replicate: int) -> int:
+        """The seed of fits (0) or of the nth replicate."""
+        return (self.seed + replicate) % 2**31
 
-    def run(self, mould: Mould, parameters: CellParameters, further: int = 0) -> Tissue:
-        """Simulate a tissue, with the seed of fits (0) or the nth further one."""
-        return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(further))
+    def run(self, mould: Mould, parameters: CellParameters, replicate: int = 0) -> Tissue:
+        """Simulate a tissue, with the seed of fits (0) or of the nth replicate."""
+        return simulate(mould, parameters, self.model, self.accuracy, self.seed_of(replicate))
+
+    def replicates(self, mould: Mould, parameters: CellParameters, count: int) -> list[Tissue]:
+        """Simulate a tissue with so many seeds, none of them that of fits."""
+        return [self.run(mould, parameters, replicate) for replicate in range(1, count + 1)]
 
     def fields(self, simulation: Tissue) -> NDArray[np.float64]:
         """The eight fields (8, y, x) of a simulated tissue."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import STARTS, Fit, minimise
-from raptor.fitting.simulator import ENOUGH, REPEATS, Simulator, measure_again
+from raptor.fitting.simulator import ENOUGH, REPLICATES, Simulator, measure_again
 from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import Target, surrogate_measure
 from raptor.moulds.geometry import Mould
@@ -26,7 +26,7 @@ def fit_tissue(
     *,
     starts: int = STARTS,
     corrections: int = CORRECTIONS,
-    repeats: int = REPEATS,
+    replicates: int = REPLICATES,
 ) -> tuple[Mapping[str, Any], Tissue]:
     """Both fits as JSON, and the first simulation, with a new seed, at the surrogate's fit.
 
@@ -36,7 +36,7 @@ def fit_tissue(
         As in `least_squares.minimise`.
     corrections : int
         Largest number of simulations for the correction.
-    repeats : int
+    replicates : int
         Simulations with new seeds at each fit.
     """
     begun = perf_counter()
@@ -48,8 +48,7 @@ def fit_tissue(
     corrected = correct(found, fine, measure, target.residuals, budget=corrections, enough=ENOUGH)
     seconds = {"surrogate_seconds": fitted - begun, "corrected_seconds": perf_counter() - fitted}
     at_fit, at_corrected = (
-        [simulator.run(mould, each.parameters, further) for further in range(1, repeats + 1)]
-        for each in (found, corrected)
+        simulator.replicates(mould, each.parameters, replicates) for each in (found, corrected)
     )
     content = {
         "target": asdict(target),

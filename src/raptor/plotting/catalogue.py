@@ -116,11 +116,11 @@ def _valley(
     posterior: Mapping[str, Any],
     points: pd.DataFrame,
     draws: pd.DataFrame,
-    further: pd.DataFrame,
+    experimental_design: pd.DataFrame,
 ) -> Drawn:
     marks = {"surrogate's fit": fit["surrogate"]["parameters"], "paper's fit": fit["paper"]}
     known = {name: mark for name, mark in marks.items() if {"delta", "kappa_nnn"} <= mark.keys()}
-    return valley_figure(points, draws, further, posterior, known), points
+    return valley_figure(points, draws, experimental_design, posterior, known), points
 
 
 def _fields(samples: Path, moulds: Path) -> Drawn:

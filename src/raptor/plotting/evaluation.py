@@ -68,7 +68,7 @@ def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Fig
     panels[0].legend(frameon=False, fontsize=7, loc="lower left")
     for axes, (name, label) in zip(panels[1:], SHAPE_LABELS.items(), strict=True):
         error = (metrics[f"{name}_predicted"] - metrics[f"{name}_simulated"]).abs()
-        flagged = metrics["unlike"].astype(bool)
+        flagged = metrics["out_of_distribution"].astype(bool)
         for part, colour, text in (
             (~flagged, SIMULATED, "like the training set"),
             (flagged, PREDICTED, "flagged"),

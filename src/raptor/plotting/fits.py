@@ -68,11 +68,11 @@ def fit_figure(
 def valley_figure(
     points: pd.DataFrame,
     draws: pd.DataFrame,
-    further: pd.DataFrame,
+    experimental_design: pd.DataFrame,
     posterior: Mapping[str, Any],
     marks: Mapping[str, Mapping[str, float]],
 ) -> Figure:
-    """What two ratios leave open: posterior draws, profile likelihoods, value of further measurements.
+    """What two ratios leave open: posterior draws, profile likelihoods, value of other measurements.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def valley_figure(
         Draws from the posterior, by parameter.
     draws : DataFrame
         Those that were simulated, with `area_ratio`.
-    further : DataFrame
+    experimental_design : DataFrame
         From `fitting.rank_measurements`.
     posterior : mapping
         From `fitting.summarise`.
@@ -93,7 +93,7 @@ def valley_figure(
     if len(draws):
         figure.colorbar(valley.collections[-1], ax=valley, label="simulated $A/A_0$", shrink=0.8)
     _draw_profiles(profiles, posterior)
-    _draw_further(bars, further)
+    _draw_experimental_design(bars, experimental_design)
     return figure
 
 
@@ -131,9 +131,9 @@ def _draw_profiles(axes: Axes, posterior: Mapping[str, Any]) -> None:
     axes.legend(frameon=False, fontsize=8, loc="lower center")
 
 
-def _draw_further(axes: Axes, further: pd.DataFrame) -> None:
-    """Relative deviations of the parameters after each further measurement."""
-    table = further[::-1]
+def _draw_experimental_design(axes: Axes, ranked: pd.DataFrame) -> None:
+    """Relative deviations of the parameters after each candidate measurement."""
+    table = ranked[::-1]
     places = np.arange(len(table))
     axes.barh(places, table["left"], 0.8, color=SIMULATED)
     axes.barh(places, table["left_exact_model"], 0.35, color="#b9c6e3")

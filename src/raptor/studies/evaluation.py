@@ -148,7 +148,7 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
     return found | {
         "disagreement": guess.disagreement,
         "distance": guess.distance,
-        "unlike": guess.out_of_distribution,
+        "out_of_distribution": guess.out_of_distribution,
     }
 
 
@@ -199,6 +199,7 @@ def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[
         for field in FIELDS
     }
     covers = [column for column in metrics if str(column).startswith("cover")]
+    flagged = metrics.get("out_of_distribution")
     return {
         "samples": len(metrics),
         "not_converged": int((~metrics["converged"].astype(bool)).sum()),
@@ -208,7 +209,7 @@ def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[
         "tether_error": float(metrics["tether_error"].mean()),
         "bulk": {name: agreement(metrics, name) for name in MEASURES},
         "coverage": {column: float(metrics[column].mean()) for column in covers},
-        "unlike": float(metrics["unlike"].mean()) if "unlike" in metrics else None,
+        "out_of_distribution": None if flagged is None else float(flagged.mean()),
         "floor": None if floor is None else float(floor["vrmse_density"].mean()),
         "in_floors": {} if floor is None else in_floors(metrics, floor),
     }
@@ -226,8 +227,8 @@ def by_region(metrics: pd.DataFrame) -> pd.DataFrame:
             }
             row |= {f"{shape}_mae": agreement(part, shape)["mae"] for shape in SHAPES}
             row |= {f"{shape}_bias": agreement(part, shape)["bias"] for shape in SHAPES}
-            if "unlike" in part:
-                row["unlike"] = part["unlike"].mean()
+            if "out_of_distribution" in part:
+                row["out_of_distribution"] = part["out_of_distribution"].mean()
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -80,7 +80,7 @@ def predict(
         row |= {f"{name}_band95": band for name, band in zip(SHAPES, bands, strict=True)}
         if parameters.delta in shown:
             fields[len(rows)] = predicted.values
-        rows.append(row | {"unlike": predicted.out_of_distribution})
+        rows.append(row | {"out_of_distribution": predicted.out_of_distribution})
         on_progress(f"{mould}, {parameters}")
     return pd.DataFrame(rows), fields
 
@@ -90,12 +90,13 @@ def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) 
 
     Columns: `mould`, `measure` (width or area), the point, `simulated` (mean over seeds), `spread` (standard
     deviation over seeds, NaN for a single one), `seeds`, `predicted`, `band95`, `difference` (predicted minus
-    simulated), `within_band` (whether the band covers the mean) and `unlike`, the surrogate's own warning.
+    simulated), `within_band` (whether the band covers the mean) and
+    `out_of_distribution`, the surrogate's own warning.
     Without a prediction the last ones are empty.
     """
     if predicted is None:
         nothing = dict.fromkeys((*SHAPES, *(f"{name}_band95" for name in SHAPES)), np.nan)
-        predicted = simulated[POINT].drop_duplicates().assign(**nothing, unlike=False)
+        predicted = simulated[POINT].drop_duplicates().assign(**nothing, out_of_distribution=False)
     there = predicted.set_index(POINT)
     tables = []
     for measure, ratio in MEASURES.items():
@@ -107,7 +108,7 @@ def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) 
         table["band95"] = 100 * there[f"{ratio}_band95"]
         table["difference"] = table["predicted"] - table["simulated"]
         table["within_band"] = table["difference"].abs() <= table["band95"]
-        table["unlike"] = there["unlike"]
+        table["out_of_distribution"] = there["out_of_distribution"]
         tables.append(table.reset_index())
     joined = pd.concat(tables, ignore_index=True)
     return joined.set_index(["mould", "measure"]).reset_index()
@@ -130,7 +131,7 @@ def differences(table: pd.DataFrame) -> list[dict[str, Any]]:
             entry["bias"] = float(known["difference"].mean())
             entry["spread"] = _finite(np.sqrt((known["spread"] ** 2).mean()))
             entry["within_band"] = float(known["within_band"].mean())
-            entry["unlike"] = float(known["unlike"].mean())
+            entry["out_of_distribution"] = float(known["out_of_distribution"].mean())
         found.append(entry)
     return found
 

@@ -151,7 +151,8 @@ class Prediction:
             "width_ratio": self.width_ratio, "width_ratio_band95": float(half[1]),
             "posts_lost": self.posts_lost, "alignment": self.alignment, "anisotropy": self.anisotropy,
             "held": self.held.tolist(),
-            "distance": self.distance, "disagreement": self.disagreement, "unlike": self.out_of_distribution,
+            "distance": self.distance, "disagreement": self.disagreement,
+            "out_of_distribution": self.out_of_distribution,
             "unusual": self.unusual,
         }  # fmt: skip
 

@@ -288,7 +288,7 @@ class BatchSolver:
                     energy=energy,
                     wall_energy=wall,
                     contact_energy=touching,
-                    gradient=residual,
+                    residual_gradient=residual,
                     converged=finite and small[row],
                     inverted_fraction=inverted[row],
                     gradient_evaluations=used,

@@ -1,5 +1,11 @@
 """Shared moulds and states, small enough for slow twins."""
 
+import os
+from functools import partial
+
+# Before NumPy and torch are imported: tests run in as many processes as there are cores.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 import shapely
@@ -10,7 +16,7 @@ from raptor.moulds import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
 from tests.small import build
 
-FINISHED = ("test_dag.py", "test_end_to_end.py", "test_report.py")
+FINISHED = ("test_dag.py", "test_end_to_end.py", "test_report.py", "test_slurm.py")
 """Files that look at the tiny run of the workflow."""
 
 
@@ -57,6 +63,17 @@ def rounding(request, monkeypatch):
 def made(tmp_path_factory):
     """A results folder; read it, do not change it."""
     return build(tmp_path_factory.mktemp("made") / "unit", 4)
+
+
+@pytest.fixture
+def quick_fits(monkeypatch):
+    """Fits by a surrogate in seconds: fewer starts, fewer refined, fewer points of the posterior."""
+    from raptor.fitting import command, least_squares, posterior  # with torch, which few tests need
+
+    monkeypatch.setattr(command, "minimise", partial(least_squares.minimise, starts=8))
+    monkeypatch.setattr(command, "survey", partial(posterior.survey, points=32))
+    monkeypatch.setattr(command, "infer", partial(posterior.infer, dense=2**12))
+    monkeypatch.setattr(least_squares, "REFINED", 1)
 
 
 @pytest.fixture

@@ -48,15 +48,6 @@ CORNERS = [
 ]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def one_thread():
-    """Threads that share small arrays wait for each other longer than they work."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 def tasks(moulds, parameters, seeds=(0,), model=MODEL):
     return [Task(m, cast(m, model), p, seed) for m in moulds for p in parameters for seed in seeds]
 

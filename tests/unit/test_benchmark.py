@@ -1,7 +1,6 @@
 """The benchmark runs, and its baselines compute the same physics."""
 
 import json
-import os
 import subprocess
 import sys
 
@@ -12,6 +11,7 @@ from benchmarks.baselines import gradient_by_bonds, gradient_by_neighbours, neig
 from raptor.condor.energy import objective, unit_orientations
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS
+from tests.commands import module
 from tests.small import ROOT
 
 pytestmark = pytest.mark.one_processor
@@ -36,21 +36,18 @@ def test_baselines_have_the_energy_and_gradient_of_the_kernel(lattice, random_st
 
 
 def test_the_benchmark_prints_its_tables():
-    command = [sys.executable, "-m", "benchmarks", "--quick"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
+    printed = module("benchmarks", "--quick")
     for title in ("Gradient", "bounds", "Trial moves", "Whole runs", "to the power"):
-        assert title in done.stdout
+        assert title in printed
 
 
 def test_the_gpu_script_runs_whole_on_a_processor(tmp_path):
     output = tmp_path / "gpu.json"
-    command = [
+    command = [  # a process of its own, for it forks others
         sys.executable, "-m", "benchmarks.gpu", str(ROOT / "tests/workflow/config/tiny.yaml"),
         "--output", str(output), "--device", "cpu", "--simulations", "2", "--checked", "2", "--channels", "2",
     ]  # fmt: skip
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(output.read_text())
     assert found["agreement"]["moulds"] == found["agreement"]["converged"] == 2

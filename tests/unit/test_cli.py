@@ -4,8 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +12,7 @@ import shapely
 import xarray as xr
 from PIL import Image
 
-from raptor.cli import COMMANDS, main
+from raptor.cli import COMMANDS
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.dataset.check import check
@@ -22,18 +20,11 @@ from raptor.fields.labelled import mould_of
 from raptor.moulds import Mould, read_mould, write_moulds
 from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
+from tests.commands import raptor
+from tests.small import ROOT
 
-ROOT = Path(__file__).parents[2]
 MOULD = str(MOULDS["tenocyte"])
 DOG_BONE = ROOT / "tests" / "data" / "moulds"
-
-
-def raptor(*arguments):
-    """What a command returns and prints."""
-    command, out, err = list(map(str, arguments)), StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
-        main(command)
-    return subprocess.CompletedProcess(command, end.value.code or 0, out.getvalue(), err.getvalue())
 
 
 def options(delta=0.5, nnn=0.5, nnnn=0.3):
@@ -242,7 +233,7 @@ def untrained(folder, *, calibrated=True):
     return folder
 
 
-def test_fit_by_a_surrogate_gives_intervals(tmp_path):
+def test_fit_by_a_surrogate_gives_intervals(tmp_path, quick_fits):
     output, picture = tmp_path / "fit.json", tmp_path / "fit.png"
     done = raptor(
         "fit", MOULD, "--tissue", "glial_1", "--model", untrained(tmp_path),

@@ -6,7 +6,8 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from raptor.config import Configuration, load, parse, require_castable, require_measurable
+from raptor.config import Configuration, load, parse
+from raptor.config.reading import require_castable, require_measurable
 from raptor.config.reference import key_table, write_reference
 from raptor.core.errors import RaptorError
 from raptor.moulds.library import MOULDS

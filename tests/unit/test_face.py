@@ -3,7 +3,6 @@
 import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from raptor.dataset.check import check
 from raptor.fields.labelled import mould_of
 from raptor.plotting import curve_figure
 from raptor.symmetry import FIELDS
+from tests.small import ROOT
 
-ROOT = Path(__file__).parents[2]
 HEAVY = ("matplotlib", "netCDF4", "numba", "numpy", "pandas", "scipy", "shapely", "torch", "typer", "xarray")
 
 

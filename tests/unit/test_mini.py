@@ -1,9 +1,5 @@
 """The small data set that is kept with the code, and what tells, loads and measures data sets."""
 
-import re
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import yaml
@@ -21,6 +17,7 @@ from raptor.parameters import CellParameters, NetworkModel
 from raptor.raster import rasterise
 from raptor.surrogate.batches import ExampleSet
 from raptor.symmetry import Element, apply
+from tests.commands import executed, module, python_blocks, raptor
 from tests.small import CAMPAIGN, MINI, ROOT
 
 
@@ -63,10 +60,9 @@ def test_what_is_not_there_cannot_be_traced():
 
 
 def test_the_command_line_traces():
-    command = [sys.executable, "-c", "from raptor.cli import main; main()", "trace", str(CAMPAIGN)]
-    done = subprocess.run([*command, "--simulation", "3"], capture_output=True, text=True, check=True)
+    done = raptor("trace", CAMPAIGN, "--simulation", 3)
     assert yaml.safe_load(done.stdout) == trace_simulation(CAMPAIGN, 3)
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = raptor("trace", CAMPAIGN)
     assert done.returncode == 1
     assert "give one of --simulation and --example" in done.stderr
 
@@ -93,19 +89,14 @@ def test_an_example_is_its_sample_moved_and_scaled(examples):
         assert np.abs(found - moved).max() < 1e-5 * np.abs(moved).max()
 
 
-def test_the_tutorial_runs():
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(), re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", "\n".join(blocks)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
+def test_the_tutorial_runs(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    printed = executed("\n".join(python_blocks(ROOT / "docs" / "tutorial.md")))
     count = len(read_examples(CAMPAIGN / "examples.csv"))
-    assert f"{count} examples; inputs (5, 64, 64), targets (8, 64, 64)" in done.stdout
+    assert f"{count} examples; inputs (5, 64, 64), targets (8, 64, 64)" in printed
 
 
 def test_the_storage_benchmark_prints_its_tables():
-    command = [sys.executable, "-m", "benchmarks.storage", str(CAMPAIGN), "--samples", "8"]
-    done = subprocess.run([*command, "--channels", "2"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
+    printed = module("benchmarks.storage", CAMPAIGN, "--samples", 8, "--channels", 2)
     for text in ("zstd 9", "zlib 1, 15 bits", "reading examples", "training, 2 base channels"):
-        assert text in done.stdout
+        assert text in printed

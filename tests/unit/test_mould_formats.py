@@ -1,9 +1,6 @@
 """The same mould as GeoJSON, SVG and PNG; and what is said of files that hold none."""
 
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +13,11 @@ from raptor.moulds import Circle, Mould, PolygonTether, read_mould
 from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
 from raptor.moulds.summary import summarise, symmetry_class
+from tests.commands import executed, python_blocks
+from tests.small import ROOT
 
 pytestmark = pytest.mark.one_processor
 
-ROOT = Path(__file__).parents[2]
 DOG_BONE = ROOT / "tests" / "data" / "moulds"
 FRAME = 'viewBox="-31.25 -31.25 62.5 62.5"'
 BOX = '<rect id="outline" x="-20" y="-10" width="40" height="20"/>'
@@ -101,13 +99,14 @@ def test_the_drawings_of_the_documentation_are_one_mould():
     assert summarise(drawn) == summarise(written)
 
 
-def test_the_page_on_moulds_shows_the_files_that_are_there(tmp_path):
+def test_the_page_on_moulds_shows_the_files_that_are_there(tmp_path, monkeypatch):
     page = (ROOT / "docs" / "moulds.md").read_text()
     for language, suffix in (("json", "geojson"), ("xml", "svg")):
         (block,) = re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
         assert block == (DOG_BONE / f"dog_bone.{suffix}").read_text()
-    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, check=True)
+    monkeypatch.chdir(tmp_path)
+    (block,) = python_blocks(ROOT / "docs" / "moulds.md")
+    executed(block)
     painted, kept = (
         np.asarray(Image.open(folder / "dog_bone.png"), dtype=int) for folder in (tmp_path, DOG_BONE)
     )

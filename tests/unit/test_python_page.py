@@ -7,14 +7,12 @@ import os
 import re
 import shutil
 from contextlib import redirect_stdout
-from functools import partial
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from raptor.fitting import command, least_squares, posterior
 from tests.small import ROOT
 
 pytestmark = pytest.mark.one_processor
@@ -39,12 +37,8 @@ def masked(text):
     return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", " ".join(text.split()))
 
 
-def test_the_page_s_blocks_print_what_it_shows(tmp_path, monkeypatch):
+def test_the_page_s_blocks_print_what_it_shows(tmp_path, monkeypatch, quick_fits):
     monkeypatch.chdir(tmp_path)
-    # A fit in seconds.
-    monkeypatch.setattr(command, "minimise", partial(least_squares.minimise, starts=4))
-    monkeypatch.setattr(command, "survey", partial(posterior.survey, points=16))
-    monkeypatch.setattr(least_squares, "REFINED", 1)
     for code, shown, printed in run(tmp_path):
         assert masked(printed) == masked(shown), code
     assert len(list(tmp_path.glob("*.png"))) == 4

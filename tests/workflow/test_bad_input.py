@@ -3,7 +3,10 @@
 import pytest
 import yaml
 
-from tests.workflow.conftest import variant
+from raptor.config import checked
+from raptor.core.blocks import read_yaml
+from raptor.core.errors import RaptorError
+from tests.workflow.place import variant
 
 CASE = {"mould": "small_rectangle", "delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3}
 PAPER = {"runs": 8, "test": 2, "validation": 2}
@@ -38,10 +41,11 @@ GRID = {"delta": [0.5], "kappa_nnn": [0.5], "ratio": [0.5]}
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )
-def test_a_bad_configuration(parsed, tmp_path, change, message):
+def test_a_bad_configuration(tmp_path, change, message):
     """In process: what the Snakefile does first."""
-    with pytest.raises(parsed.Error) as caught:
-        parsed(variant(tmp_path, **change))
+    path = variant(tmp_path, **change)
+    with pytest.raises(RaptorError) as caught:
+        checked(read_yaml(path), str(path))
     assert message in str(caught.value)
 
 

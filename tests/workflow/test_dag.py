@@ -1,13 +1,11 @@
 """What a change makes run again: the set of rules in the resolved DAG."""
 
-import subprocess
-
 import pytest
 import yaml
 
 from raptor.moulds.library import TISSUES
 from tests.small import ROOT
-from tests.workflow.conftest import TINY, variant
+from tests.workflow.place import PROFILES, TINY, variant
 
 PAPER = "results/tiny/campaigns/paper/fields.nc"
 
@@ -30,12 +28,6 @@ EVERYTHING = (
 )
 
 
-@pytest.fixture
-def place(finished):
-    assert finished.result.returncode == 0, finished.result.stderr[-3000:]
-    return finished
-
-
 def test_an_empty_folder_needs_everything(workplace):
     assert workplace("empty").jobs() == EVERYTHING
 
@@ -46,7 +38,7 @@ def test_a_second_run_has_nothing_to_do(place):
 
 
 def test_a_lost_report_is_written_again(place):
-    folder = place.folder / "results" / "tiny"
+    folder = place.results
     for name, jobs in (("workflow.html", set()), ("report.html", {"write_report"})):
         (folder / name).unlink()
         assert place.jobs() == jobs | {"report", "all"}
@@ -154,13 +146,10 @@ def test_several_tissues_are_fitted_together_too(workplace, tmp_path):
 
 def test_a_gpu_s_profile_asks_for_it_where_it_is_used(workplace):
     place = workplace("gpu")
-    profile = str(ROOT / "workflow" / "profiles" / "gpu")
-    done = place.run("--dry-run", "--cores", "4", "--workflow-profile", profile, PAPER)
+    done = place.run("--dry-run", "--cores", "4", "--workflow-profile", PROFILES / "gpu", PAPER)
     assert done.returncode == 0, done.stderr
     shown = done.stdout + done.stderr
     assert shown.count("gpu=1") >= 4  # three shards and the stack
-    laid_over = place.command("--dry-run", PAPER)
-    laid_over.insert(laid_over.index(str(TINY)) + 1, str(ROOT / "config" / "gpu.yaml"))
-    done = subprocess.run(laid_over, capture_output=True, text=True, check=False, cwd=place.folder)
+    done = place.run(ROOT / "config" / "gpu.yaml", "--dry-run", PAPER)  # laid over the tiny one
     assert done.returncode == 0, done.stderr
     assert "00000-00007.nc" in done.stdout + done.stderr  # one shard for the GPU

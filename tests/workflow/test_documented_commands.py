@@ -22,6 +22,7 @@ from raptor.cli import app
 from raptor.dataset.publish import publish
 from tests.photograph import CASES
 from tests.small import MINI, ROOT
+from tests.workflow.place import snakemake
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^ *```(\w*)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
@@ -139,10 +140,8 @@ def test_a_dry_run_finds_its_rules(command, tmp_path):
     shutil.copytree(ROOT / "tests" / "data" / "moulds", tmp_path / "my_moulds")
     (tmp_path / "my_moulds" / "dog_bone.geojson").unlink()  # drawn in the others too
     (tmp_path / "my_moulds" / "dog_bone.png").unlink()
-    done = subprocess.run(
-        [sys.executable, "-m", *command, "--dry-run"],
-        cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    assert command[0] == "snakemake"
+    done = snakemake(*command[1:], "--dry-run", folder=tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]
     assert "This was a dry-run" in done.stdout + done.stderr
 

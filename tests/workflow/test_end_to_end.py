@@ -16,15 +16,9 @@ from raptor.core.jobs import hold_lock
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
 from raptor.symmetry import FIELDS
-from tests.workflow.conftest import variant
+from tests.workflow.place import variant
 
 CAMPAIGNS = {"paper", "replicates", "soft_corner", "active", "sweep"}
-
-
-@pytest.fixture
-def results(finished):
-    assert finished.result.returncode == 0, finished.result.stderr[-3000:]
-    return finished.folder / "results" / "tiny"
 
 
 def test_the_run_ends_with_the_report(results):
@@ -176,24 +170,16 @@ def test_every_figure_has_its_data(results):
         assert made & {".csv", ".nc"}
 
 
-def test_one_core_and_other_shards_give_the_same_data(results, workplace, tmp_path):
-    paper = results / "campaigns" / "paper"
-    for cores, size in ((1, 1), (2, 8)):
-        place = workplace(f"cores{cores}")
-        done = place.run(
-            "--cores",
-            str(cores),
-            "campaign_paper",
-            configuration=variant(tmp_path, shard_size=size),
-        )
-        assert done.returncode == 0, done.stderr[-2000:]
-        assert differences(paper, place.folder / "results" / "tiny" / "campaigns" / "paper") == []
+def test_one_core_and_another_shard_give_the_same_data(results, workplace, tmp_path):
+    place = workplace("one_core")
+    done = place.run("--cores", "1", "campaign_paper", configuration=variant(tmp_path, shard_size=8))
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert differences(*(each / "campaigns" / "paper" for each in (results, place.results))) == []
 
 
 def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
     """SIGKILL to everything, twice: among simulations and in training."""
     place = workplace("killed")
-    folder = place.folder / "results" / "tiny"
     target = "results/tiny/surrogate/film_unet/weights.safetensors"
     for seen in ("campaigns/paper/shards/00000-00002.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
         run = subprocess.Popen(
@@ -201,7 +187,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
             cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         deadline = time.monotonic() + 300
-        while not (folder / seen).exists():
+        while not (place.results / seen).exists():
             assert time.monotonic() < deadline, f"{seen} never appeared"
             assert run.poll() is None, f"the run ended before {seen} appeared"
             time.sleep(0.005)
@@ -209,27 +195,27 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
         run.wait()
     done = place.run("--cores", "2", target)
     assert done.returncode == 0, done.stderr[-2000:]
-    campaigns = [each / "campaigns" / "paper" for each in (results, folder)]
-    assert differences(*campaigns) == []
-    weights = [load_file(f / "surrogate" / "film_unet" / "weights.safetensors") for f in (results, folder)]
+    folders = results, place.results
+    assert differences(*(folder / "campaigns" / "paper" for folder in folders)) == []
+    weights = [load_file(folder / "surrogate" / "film_unet" / "weights.safetensors") for folder in folders]
     assert all(np.array_equal(weights[0][name], weights[1][name]) for name in weights[0])
 
 
-def test_a_truncated_shard_stops_the_run_with_one_sentence(results, workplace):
-    place = workplace("truncated")
-    shutil.copytree(results.parents[1] / "results", place.folder / "results")
-    shutil.copytree(results.parents[1] / ".snakemake", place.folder / ".snakemake")
-    paper = place.folder / "results" / "tiny" / "campaigns" / "paper"
-    target = "campaign_paper"
+def test_a_truncated_shard_stops_the_run_with_one_sentence(place, workplace):
+    other = workplace("truncated")
+    for name in ("results", ".snakemake"):
+        shutil.copytree(place.folder / name, other.folder / name)
+    before, paper = (each.results / "campaigns" / "paper" for each in (place, other))
+    target = "results/tiny/campaigns/paper/fields.nc"
     shard = next((paper / "shards").glob("*.nc"))
     shard.write_bytes(shard.read_bytes()[:2000])
-    done = place.run("--cores", "1", target)
+    done = other.run("--cores", "1", target)
     assert done.returncode != 0
     assert f"{shard.name} is truncated or damaged" in done.stderr + done.stdout
     shard.unlink()
-    done = place.run("--cores", "2", target)
+    done = other.run("--cores", "2", target)
     assert done.returncode == 0
-    assert differences(results / "campaigns" / "paper", paper) == []
+    assert differences(before, paper) == []
 
 
 def test_a_second_run_at_once_is_refused_and_touches_nothing(workplace):

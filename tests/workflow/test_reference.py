@@ -2,10 +2,9 @@
 
 import re
 import runpy
-import subprocess
-import sys
 
 from tests.small import ROOT
+from tests.workflow.place import snakemake
 
 REFERENCE = runpy.run_path(str(ROOT / "workflow" / "reference.py"))
 PICTURE = (ROOT / "docs" / "images" / "workflow.svg").read_text()
@@ -13,8 +12,8 @@ PICTURE = (ROOT / "docs" / "images" / "workflow.svg").read_text()
 
 def listed():
     """Rules as Snakemake lists them, those made for each campaign under one name."""
-    command = [sys.executable, "-m", "snakemake", "--list"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    done = snakemake("--list", folder=ROOT)
+    assert done.returncode == 0, done.stderr
     return {re.sub(r"^campaign_\w+", "campaign_NAME", line.split()[0]) for line in done.stdout.splitlines()}
 
 

@@ -24,12 +24,6 @@ window.addEventListener("load", () => {
 </script>"""
 
 
-@pytest.fixture
-def results(finished):
-    assert finished.result.returncode == 0, finished.result.stderr[-3000:]
-    return finished.folder / "results" / "tiny"
-
-
 class Resources(HTMLParser):
     """What a page loads, and where it links to."""
 

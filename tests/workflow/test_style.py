@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import ROOT
+from tests.small import ROOT
+from tests.workflow.place import snakemake
 
 
 def run(*command, **options):
@@ -32,7 +33,7 @@ def test_clean(command):
 
 
 def test_snakemake_lint():
-    done = run(sys.executable, "-m", "snakemake", "--lint")
+    done = snakemake("--lint", folder=ROOT)
     found = set(re.findall(r"^    \* (.+)$", done.stdout + done.stderr, re.MULTILINE))
     # workflow/env provides one locked environment for all rules, without conda or containers.
     assert found == {"Specify a conda environment or container for each rule.:"}, done.stderr

@@ -6,12 +6,11 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from raptor import config as configuration
+from raptor.config import checked
 from raptor.core.compiled import source_hash
 from raptor.core.errors import RaptorError
 from raptor.core.jobs import hold_lock
 from raptor.core.version import MODEL_VERSION
-from raptor.moulds.library.tissues import load_tissues
 from raptor.moulds.reading import find_mould
 from raptor.surrogate.baselines import BASELINES
 
@@ -20,17 +19,11 @@ if "name" not in config:
         "the configuration has no name; give its results a folder by 'name: ...'"
     )
 try:
-    CONFIG = configuration.parse(
+    CONFIG, TISSUES = checked(
         config,
         "configuration",
         [Path(file).parent for file in reversed(workflow.configfiles)],
     )
-    configuration.require_castable(CONFIG)
-    MODELS = CONFIG.models
-    TISSUES = load_tissues(
-        CONFIG.fit.tissues_file, CONFIG.fit.tissues if MODELS else ()
-    )
-    configuration.require_measurable(TISSUES, CONFIG.mould_scale)
 except RaptorError as error:
     raise WorkflowError(str(error))
 
@@ -42,6 +35,7 @@ RESULTS = f"results/{CONFIG.name}"
 CAMPAIGN = f"{RESULTS}/campaigns/{{campaign}}"
 STUDY = f"{RESULTS}/studies/{{campaign}}"
 CAMPAIGNS = CONFIG.campaigns
+MODELS = CONFIG.models
 SWEEPS = [name for name, campaign in CAMPAIGNS.items() if campaign.grid]
 CASES = CONFIG.tradeoff.cases
 

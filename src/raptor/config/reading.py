@@ -11,7 +11,7 @@ from raptor.config.configuration import Configuration
 from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
 from raptor.moulds.cast import cast_sites, central_section
-from raptor.moulds.library.tissues import MeasuredTissue
+from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
 from raptor.moulds.reading import read_at_scale, read_mould
 
 
@@ -66,6 +66,24 @@ def _found(name: str, folders: Sequence[Path]) -> str:
             path = Path(os.path.normpath(beside.absolute()))
             return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
     return name
+
+
+def checked(
+    content: Any, where: str, folders: Sequence[Path] = ()
+) -> tuple[Configuration, dict[str, MeasuredTissue]]:
+    """A run's configuration, as by `parse`, and the tissues that it fits, with every mould that they name.
+
+    Raises
+    ------
+    RaptorError
+        If a key, a tissue or a mould cannot be used.
+    """
+    configuration = parse(content, where, folders)
+    require_castable(configuration)
+    fit = configuration.fit
+    tissues = load_tissues(fit.tissues_file, fit.tissues if configuration.models else ())
+    require_measurable(tissues, configuration.mould_scale)
+    return configuration, tissues
 
 
 def require_castable(configuration: Configuration) -> None:

@@ -14,7 +14,7 @@ from raptor.condor import simulate
 from raptor.condor.lattice import build_lattice
 from raptor.moulds import Circle, Mould
 from raptor.parameters import CellParameters, NetworkModel
-from tests.small import build
+from tests.small import ROOT, build
 
 FINISHED = ("test_dag.py", "test_end_to_end.py", "test_report.py", "test_slurm.py")
 """Files that look at the tiny run of the workflow."""
@@ -30,6 +30,16 @@ def pytest_xdist_make_scheduler(config, log):
             return "finished" if file.endswith(FINISHED) else file
 
     return ByWhatIsShared(config, log)
+
+
+def pytest_collection_modifyitems(items):
+    """What looks at the tiny run first, then the other long files, so that both workers end together."""
+    folders = [ROOT / "tests" / name for name in ("workflow", "physics", "unit")]
+
+    def place(item):
+        return item.path.name not in FINISHED, *(folder not in item.path.parents for folder in folders)
+
+    items.sort(key=place)
 
 
 def pytest_addoption(parser):

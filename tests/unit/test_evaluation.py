@@ -46,17 +46,17 @@ DRAWN = {"test": None, "validation": 0, "edge": 0}
 """Keys of a campaign that holds out all of its runs."""
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def stack(made):
     return made / "fields.nc"
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def moulds(made):
     return moulds_by_id(made / "moulds.geojson")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def surrogate(stack, moulds):
     """Two untrained networks, calibrated."""
     torch.manual_seed(0)

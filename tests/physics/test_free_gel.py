@@ -14,11 +14,12 @@ from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
 
 GEL = Mould(shapely.box(-5.2, -4.2, 5.2, 4.2), name="gel")
+SMALL = Mould(shapely.box(-3.2, -2.2, 3.2, 2.2), name="small gel")
 
 
 def contracted(parameters, layers, orientation):
-    """Cast and final positions (cells, 3) of a free gel whose orientations are prescribed."""
-    lattice = build_lattice(GEL, parameters, NetworkModel(layers))
+    """Cast and final positions (cells, 3) of a small free gel whose orientations are prescribed."""
+    lattice = build_lattice(SMALL, parameters, NetworkModel(layers))
     network = build_network(lattice)
     held = np.repeat(np.array(orientation, dtype=float), lattice.cells)
 

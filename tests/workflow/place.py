@@ -15,6 +15,8 @@ from tests.small import ROOT
 TINY = ROOT / "tests" / "workflow" / "config" / "tiny.yaml"
 PROFILES = ROOT / "workflow" / "profiles"
 
+ENVIRONMENT = os.environ | {"SNAKEMAKE_PROFILE": str(PROFILES / "default")}
+
 FORKED = multiprocessing.get_context("forkserver")
 FORKED.set_forkserver_preload(
     ["snakemake.cli", "snakemake_executor_plugin_slurm", "raptor.config", "raptor.surrogate.baselines"]
@@ -23,22 +25,20 @@ FORKED.set_forkserver_preload(
 
 def snakemake(*arguments, folder):
     """Run Snakemake's command line in a folder, in a process forked from one that has imported it."""
-    environment = os.environ | {"SNAKEMAKE_PROFILE": str(PROFILES / "default")}
     with TemporaryDirectory() as printed:
         files = [Path(printed, name) for name in ("stdout", "stderr")]
-        child = FORKED.Process(target=_forked, args=([*map(str, arguments)], str(folder), environment, files))
+        child = FORKED.Process(target=_forked, args=([*map(str, arguments)], str(folder), files))
         child.start()
         child.join()
         return CompletedProcess(arguments, child.exitcode, *(file.read_text() for file in files))
 
 
-def _forked(arguments, folder, environment, files):
+def _forked(arguments, folder, files):
     for number, file in enumerate(files, start=1):
         with file.open("w") as opened:
             os.dup2(opened.fileno(), number)
     os.chdir(folder)
-    os.environ.clear()
-    os.environ.update(environment)
+    os.environ.update(ENVIRONMENT)
     sys.argv = ["snakemake", *arguments]
     from snakemake.cli import main
 

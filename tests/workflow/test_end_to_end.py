@@ -16,7 +16,7 @@ from raptor.core.jobs import hold_lock
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
 from raptor.symmetry import FIELDS
-from tests.workflow.place import variant
+from tests.workflow.place import ENVIRONMENT, variant
 
 CAMPAIGNS = {"paper", "replicates", "soft_corner", "active", "sweep"}
 
@@ -170,21 +170,15 @@ def test_every_figure_has_its_data(results):
         assert made & {".csv", ".nc"}
 
 
-def test_one_core_and_another_shard_give_the_same_data(results, workplace, tmp_path):
-    place = workplace("one_core")
-    done = place.run("--cores", "1", "campaign_paper", configuration=variant(tmp_path, shard_size=8))
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert differences(*(each / "campaigns" / "paper" for each in (results, place.results))) == []
-
-
-def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
-    """SIGKILL to everything, twice: among simulations and in training."""
-    place = workplace("killed")
+def test_killed_twice_and_in_other_shards_on_one_core_the_data_are_the_same(results, workplace, tmp_path):
+    """SIGKILL to everything, among simulations and in training; the weights are the same too."""
+    place, configuration = workplace("killed"), variant(tmp_path, shard_size=2)
     target = "results/tiny/surrogate/film_unet/weights.safetensors"
-    for seen in ("campaigns/paper/shards/00000-00002.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
+    for seen in ("campaigns/paper/shards/00000-00001.nc", "surrogate/film_unet/members/0/checkpoint.pt"):
         run = subprocess.Popen(
-            place.command("--cores", "2", "--nolock", "--rerun-incomplete", target),
-            cwd=place.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            place.command("--cores", "2", target, configuration=configuration),
+            cwd=place.folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )  # fmt: skip
         deadline = time.monotonic() + 300
         while not (place.results / seen).exists():
@@ -193,7 +187,7 @@ def test_killed_and_run_again_it_ends_with_the_same_data(results, workplace):
             time.sleep(0.005)
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
-    done = place.run("--cores", "2", target)
+    done = place.run("--cores", "1", target, configuration=configuration)
     assert done.returncode == 0, done.stderr[-2000:]
     folders = results, place.results
     assert differences(*(folder / "campaigns" / "paper" for folder in folders)) == []

@@ -29,7 +29,7 @@ from raptor.fitting.posterior import interpolation_error
 from raptor.fitting.targets import as_array, prior_density
 from raptor.moulds import Mould
 from raptor.moulds.cast import CastMould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, NetworkModel
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters, NetworkModel
 from raptor.raster import rasterise
 from tests.stand_ins import TRUTH, smooth
 
@@ -151,7 +151,8 @@ def test_simulated_draws_tell_thickness_and_errors():
 
 
 def test_what_is_seen_does_not_turn_with_the_mould():
-    made = simulate(BOX, TRUTH, NetworkModel(2), "draft", 0)
+    little = CellParameters(0.2, 0.4, 0.2)  # so that there is tissue in every section
+    made = simulate(BOX, little, NetworkModel(2), "draft", 0)
     fields = rasterise(made.positions, made.orientation, made.tension, 128)
     turned = fields.swapaxes(1, 2)[:, :, ::-1].copy()  # a quarter turn
     turned[2], turned[3], turned[5] = turned[3].copy(), turned[2].copy(), -turned[5]

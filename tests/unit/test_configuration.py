@@ -14,6 +14,8 @@ from raptor.moulds.library import MOULDS
 from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
 from raptor.parameters import CellParameters
 
+pytestmark = pytest.mark.one_processor
+
 MIDDLE = {"delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3}
 
 

@@ -10,6 +10,8 @@ from raptor.moulds.families import MARGIN, MouldFamilies
 from raptor.moulds.outlines import OUTLINES, irregular
 from raptor.moulds.tether_layouts import LAYOUTS
 
+pytestmark = pytest.mark.one_processor
+
 RULES = MouldFamilies()
 
 

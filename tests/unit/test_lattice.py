@@ -9,6 +9,8 @@ from raptor.moulds.cast import cast_sites
 from raptor.parameters import SHELL_DISTANCE, CellParameters, NetworkModel
 from tests import naive
 
+pytestmark = pytest.mark.one_processor
+
 
 def test_reference_mould_has_the_cells_and_bonds_of_the_model():
     posts = tuple(Circle(x, y, 1.5) for x in (-21, 21) for y in (-8.5, 8.5))

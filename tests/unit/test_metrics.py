@@ -6,6 +6,8 @@ from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, p
 from raptor.studies.tradeoff import Reference, _resampled, summarise
 from raptor.symmetry import FIELDS
 
+pytestmark = pytest.mark.one_processor
+
 RNG = np.random.default_rng(0)
 
 

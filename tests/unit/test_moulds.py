@@ -12,6 +12,8 @@ from raptor.moulds.library import MOULDS
 from raptor.moulds.random_moulds import GROUPS, RandomMoulds
 from raptor.symmetry import Element
 
+pytestmark = pytest.mark.one_processor
+
 RULES = RandomMoulds(cells=(500, 3000), tethers=(2, 16))
 
 

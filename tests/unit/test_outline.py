@@ -19,6 +19,8 @@ from raptor.fitting.targets import as_array
 from raptor.frame import pixel_centres
 from tests.stand_ins import TRUTH, ellipse
 
+pytestmark = pytest.mark.one_processor
+
 
 def test_distances_to_an_outline_are_signed_and_finer_than_a_pixel():
     x, y = np.meshgrid(pixel_centres(64), pixel_centres(64))

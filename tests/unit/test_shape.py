@@ -14,6 +14,8 @@ from raptor.moulds.random_moulds import RandomMoulds
 from raptor.raster import density_image, density_threshold
 from raptor.symmetry import Element
 
+pytestmark = pytest.mark.one_processor
+
 X, Y = np.meshgrid(pixel_centres(256), pixel_centres(256))
 BOX = shapely.box(-20, -10, 20, 10)
 POSTS = tuple(Circle(x, y, 1.3) for x in (-15, 15) for y in (-6, 6))

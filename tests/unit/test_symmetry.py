@@ -7,6 +7,8 @@ import torch
 from raptor.raster import rasterise
 from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
+pytestmark = pytest.mark.one_processor
+
 ELEMENTS = Element.all()
 
 

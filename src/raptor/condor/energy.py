@@ -60,8 +60,7 @@ def scratch(cells: int, precision: DTypeLike = np.float64) -> Scratch:
 def _bonds_kernel(cells, network, delta, contact, work):
     """Energy of all bonds and contacts of the unit state; adds -dE/dx and dE/ds to the forces."""
     unit, force = work.unit, work.force
-    room = (unit.size - 6 * cells) // 2
-    n = cells
+    n, room = cells, (unit.size - 6 * cells) // 2
     energy = touching = 0.0
     for chunk in range(network.first.size):
         i = network.first[chunk] + room

@@ -77,13 +77,14 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def quick_fits(monkeypatch):
-    """Fits by a surrogate in seconds: fewer starts, fewer refined, fewer points of the posterior."""
+    """Fits by a surrogate in seconds: fewer starts, fewer steps, fewer points of the posterior."""
     from raptor.fitting import command, least_squares, posterior  # with torch, which few tests need
 
-    monkeypatch.setattr(command, "minimise", partial(least_squares.minimise, starts=8))
-    monkeypatch.setattr(command, "survey", partial(posterior.survey, points=32))
+    monkeypatch.setattr(command, "minimise", partial(least_squares.minimise, starts=4))
+    monkeypatch.setattr(command, "survey", partial(posterior.survey, points=16))
     monkeypatch.setattr(command, "infer", partial(posterior.infer, dense=2**12))
     monkeypatch.setattr(least_squares, "REFINED", 1)
+    monkeypatch.setattr(least_squares, "MOST_STEPS", 4)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from raptor.condor.energy import objective, unit_orientations
 from raptor.condor.network import build_network
 from raptor.condor.walls import NO_WALLS
 from tests.commands import module
-from tests.small import ROOT
+from tests.workflow.place import variant
 
 pytestmark = pytest.mark.one_processor
 
@@ -42,9 +42,11 @@ def test_the_benchmark_prints_its_tables():
 
 
 def test_the_gpu_script_runs_whole_on_a_processor(tmp_path):
-    output = tmp_path / "gpu.json"
+    """A design of tissues that contract little, which takes few steps."""
+    output, little = tmp_path / "gpu.json", {"runs": 8, "test": 2, "validation": 2, "delta": [0.05, 0.1]}
+    configuration = variant(tmp_path, campaigns__paper=little, random_moulds__cells=[60, 100])
     command = [  # a process of its own, for it forks others
-        sys.executable, "-m", "benchmarks.gpu", str(ROOT / "tests/workflow/config/tiny.yaml"),
+        sys.executable, "-m", "benchmarks.gpu", str(configuration),
         "--output", str(output), "--device", "cpu", "--simulations", "2", "--checked", "2", "--channels", "2",
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -337,7 +337,7 @@ def by_campaign(
             "floor": summary["floor"],
             **{f"{shape}_mae": summary["bulk"][shape]["mae"] for shape in SHAPES},
             "cover95_area_ratio": summary["coverage"]["cover95_area_ratio"],
-            "unlike": summary["unlike"],
+            "out_of_distribution": summary["out_of_distribution"],
         }
         for name, training in trained.items()
         for campaign, summary in summaries[name].items()

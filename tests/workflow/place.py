@@ -10,6 +10,8 @@ from tempfile import TemporaryDirectory
 
 import yaml
 
+from raptor.config import checked
+from raptor.core.blocks import read_yaml
 from tests.small import ROOT
 
 TINY = ROOT / "tests" / "workflow" / "config" / "tiny.yaml"
@@ -75,6 +77,11 @@ class Workplace:
         done = self.run("--dry-run", *arguments, configuration=configuration)
         assert done.returncode == 0, done.stderr
         return set(re.findall(r"^(?:local)?rule (\w+):", done.stderr + done.stdout, re.MULTILINE))
+
+
+def parsed(path):
+    """What the Snakefile does with a configuration before any rule is read."""
+    return checked(read_yaml(path), str(path), [path.parent])
 
 
 def variant(folder, **changes):

@@ -3,10 +3,8 @@
 import pytest
 import yaml
 
-from raptor.config import checked
-from raptor.core.blocks import read_yaml
 from raptor.core.errors import RaptorError
-from tests.workflow.place import variant
+from tests.workflow.place import parsed, variant
 
 CASE = {"mould": "small_rectangle", "delta": 0.5, "kappa_nnn": 0.5, "kappa_nnnn": 0.3}
 PAPER = {"runs": 8, "test": 2, "validation": 2}
@@ -43,9 +41,8 @@ GRID = {"delta": [0.5], "kappa_nnn": [0.5], "ratio": [0.5]}
 )
 def test_a_bad_configuration(tmp_path, change, message):
     """In process: what the Snakefile does first."""
-    path = variant(tmp_path, **change)
     with pytest.raises(RaptorError) as caught:
-        checked(read_yaml(path), str(path))
+        parsed(variant(tmp_path, **change))
     assert message in str(caught.value)
 
 

@@ -9,6 +9,7 @@ import yaml
 from raptor.config import load
 from raptor.core.errors import RaptorError
 from tests.small import ROOT
+from tests.workflow.place import parsed
 
 MOULDS = ROOT / "tests" / "data" / "moulds"
 SMALL = {"name": "mine", "layers": 2, "accuracy": "draft", "pixels": 64, "models": {}}
@@ -83,7 +84,7 @@ def test_moulds_are_found_beside_the_configuration_then_here_then_in_the_library
         ({"a.geojson": "", "a.svg": ""}, "same name"),
     ],
 )
-def test_a_folder_that_cannot_be_used_is_named_before_any_work(parsed, tmp_path, content, message):
+def test_a_folder_that_cannot_be_used_is_named_before_any_work(tmp_path, content, message):
     (tmp_path / "my_moulds").mkdir()
     for name, text in content.items():
         (tmp_path / "my_moulds" / name).write_text(text)

@@ -37,7 +37,7 @@ def results(workplace, tmp_path_factory):
     path = tmp_path_factory.mktemp("configuration") / "learning.yaml"
     path.write_text(yaml.safe_dump(SMALL))
     done = place.run(
-        "--cores", "2", "results/learning/figures/learning.png", "results/learning/shipped/card.md",
+        "--cores", "2", "results/learning/figures/learning.png", "publish",
         configuration=path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
@@ -73,6 +73,22 @@ def test_the_card_tells_both_test_splits(results):
     assert "2 simulations of `paper` and 3 simulations of `families`" in card
     assert "### Campaign `paper`" in card
     assert "### Campaign `families`" in card
+
+
+def test_the_published_folder_is_sound_and_takes_no_room_twice(results):
+    published = results / "publish"
+    assert check(published, 0.1) == []
+    for path in (results / "campaigns").rglob("*.*"):
+        if path.name != "splits_checked.txt":
+            assert path.samefile(published / path.relative_to(results))
+    card = (published / "surrogate" / "README.md").read_text()
+    header = yaml.safe_load(card.split("---\n")[1])
+    assert header["license"] == "cc-by-4.0"
+    assert [result["dataset"]["name"] for result in header["model-index"][0]["results"]] == [
+        "paper, test split", "families, test split",
+    ]  # fmt: skip
+    made = {path.name for path in (published / "surrogate").iterdir()}
+    assert made == {"README.md", "weights.safetensors", "model.json", "training.csv"}
 
 
 def test_the_check_covers_every_model(results):

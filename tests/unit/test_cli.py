@@ -21,6 +21,7 @@ from raptor.moulds import Mould, read_mould, write_moulds
 from raptor.moulds.cast import cast_sites
 from raptor.moulds.library import MOULDS
 from tests.commands import raptor
+from tests.photograph import CASES
 from tests.small import ROOT
 
 MOULD = str(MOULDS["tenocyte"])
@@ -247,6 +248,22 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path, quick_fits):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_fit_to_a_photograph_fits_what_measure_measures(tmp_path, quick_fits):
+    case = next(each for each in CASES if each.mould == "tenocyte")
+    _, _, grey = case.made()
+    photo, output, overlay = (tmp_path / name for name in ("photo.png", "fit.json", "overlay.png"))
+    Image.fromarray(grey).save(photo)
+    options = ("--model", untrained(tmp_path), "--output", output)
+    done = raptor("fit", case.mould, "--photo", photo, "--overlay", overlay, *options)
+    assert done.returncode == 0, done.stderr
+    measured = json.loads(raptor("measure", photo, "--mould", case.mould, "--json").stdout)
+    target = json.loads(output.read_text())["target"]
+    assert target == {name: measured[name] for name in ("area_ratio", "width_ratio")}
+    assert overlay.read_bytes().startswith(b"\x89PNG")
+    done = raptor("fit", case.mould, "--photo", photo, "--area-ratio", 0.5, *options)
+    assert "give one kind of measurement" in done.stderr
+
+
 @pytest.mark.parametrize("what", ["ratios", "outline"])
 def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
     """The tissue that is fitted is one of the simulator's own, a little off the start."""
@@ -288,7 +305,7 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
         (("--area-ratio", 0.5, *options()), "or --by simulator"),
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
         (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
-        (("--outline", MOULD), "is no picture that can be read: its content looks like JSON"),
+        (("--outline", MOULD), "holds no polygon; give what raptor measure --outline writes"),
         (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is not a picture's name"),
     ],
 )

@@ -1,9 +1,12 @@
 """Fits to a whole outline."""
 
+import json
+
 import numpy as np
 import pytest
 import shapely
 from PIL import Image
+from shapely.geometry import mapping
 
 from raptor.core.errors import RaptorError
 from raptor.fitting import (
@@ -63,6 +66,21 @@ def test_an_outline_is_read_from_a_picture(tmp_path):
     (tmp_path / "bad.png").write_bytes(b"no picture")
     with pytest.raises(RaptorError, match="no picture"):
         read_outline(tmp_path / "bad.png")
+
+
+def test_an_outline_is_read_from_geojson(tmp_path):
+    path, tissue = tmp_path / "tissue.geojson", shapely.Point(0, 0).buffer(10)
+    path.write_text(json.dumps({"type": "Feature", "geometry": mapping(tissue), "properties": {}}))
+    assert np.allclose(read_outline(path).points, Outline.along(tissue).points)
+    for content, message in (
+        ({"type": "Feature", "geometry": mapping(shapely.Point(0, 0))}, "holds no polygon"),
+        ({"type": "Feature", "geometry": mapping(shapely.box(0, 0, 90, 9))}, "leaves the frame"),
+        ([1], "is not GeoJSON of one tissue"),
+        ({"type": "nothing"}, "is not GeoJSON of one tissue"),
+    ):
+        path.write_text(json.dumps(content))
+        with pytest.raises(RaptorError, match=message):
+            read_outline(path)
 
 
 def test_an_outline_of_several_pieces_has_points_on_each():

@@ -118,7 +118,7 @@ def run(command, long):
         assert command[0] in ("snakemake", "uv", "python"), f"{shlex.join(command)} is not known to this test"
 
 
-@pytest.mark.parametrize("page", filter(LINES.get, PAGES), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [page for page in PAGES if LINES.get(page)], ids=lambda page: page.name)
 def test_a_page_s_commands_run(page, desk):
     for line in LINES[page]:
         if line.startswith(("cp ", "mkdir ")):

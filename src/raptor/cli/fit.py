@@ -1,5 +1,6 @@
 """raptor fit: parameters of a tissue from its area and width, or from its whole outline."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +10,7 @@ import raptor
 from raptor.cli import options as opt
 
 By = Literal["surrogate", "simulator"]
+ONE_KIND = "give one kind of measurement: ratios, --tissue NAME, --photo, or --outline"
 
 
 AreaRatio = Annotated[float | None, typer.Option(help="measured A/A0")]
@@ -16,8 +18,15 @@ WidthRatio = Annotated[float | None, typer.Option(help="measured w/w0 (central w
 Tissue = Annotated[str | None, typer.Option(help="use the measured ratios of this tissue")]
 Outline = Annotated[
     Path | None,
-    typer.Option(help="picture of the tissue, or a mask, cropped to the frame of 62.5 l0 about the mould"),
+    typer.Option(
+        help="GeoJSON from raptor measure, or a picture of the tissue cropped to the frame of 62.5 l0"
+    ),
 ]
+Photo = Annotated[
+    Path | None,
+    typer.Option(help="photograph of the tissue in its mould, measured first as by raptor measure"),
+]
+Overlay = Annotated[Path | None, typer.Option(help="with --photo: picture of what was measured, to check")]
 Model = Annotated[By, typer.Option(help="fit by the surrogate alone, or continue with the simulator")]
 Layers = Annotated[int | None, typer.Option(help="cell layers of simulations [those of the surrogate]")]
 Accuracy = Annotated[str, typer.Option(help="accuracy of simulations: draft, standard or reference")]
@@ -37,6 +46,8 @@ def fit(
     tissue: Tissue = None,
     tissues: opt.Tissues = None,
     outline: Outline = None,
+    photo: Photo = None,
+    overlay: Overlay = None,
     by: Model = "surrogate",
     model: opt.Surrogate = None,
     delta: opt.Delta = None,
@@ -55,15 +66,17 @@ def fit(
 ) -> None:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Give one or both measured ratios, the name of a tissue of the library, or a picture of the tissue to fit
-    its whole outline. Two ratios cannot determine three parameters; the intervals in the output show what
-    they leave open (docs/fits.md). With --by simulator the search continues from the surrogate's fit, or
-    starts from given parameters without a surrogate.
+    Give a photograph of the tissue in its mould, one or both measured ratios, the name of a tissue of the
+    library, or its whole outline. Two ratios cannot determine three parameters; the intervals in the output
+    show what they leave open (docs/fits.md). With --by simulator the search continues from the surrogate's
+    fit, or starts from given parameters without a surrogate.
 
     Example:
       raptor fit glial_1 --tissue glial_1 --output fit.json
       raptor fit mould.svg --area-ratio 0.75 --width-ratio 0.70
           --output fit.json --picture fit.png
+      raptor fit mould.svg --photo photograph.png --overlay overlay.png
+          --by simulator --simulations 8 --output fit.json --picture fit.png
       raptor fit mould.svg --outline tissue.png --by simulator --output fit.json
     """
     ratios, parameters = (area_ratio, width_ratio), (delta, kappa_nnn, kappa_nnnn)
@@ -71,8 +84,11 @@ def fit(
         ratios = _measured(tissue, tissues, ratios)
     start = None if parameters == (None, None, None) else opt.cell_parameters(*parameters)
     shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
-    opt.require_writable(output, mould, outline, kind="a JSON file")
-    opt.require_picture_writable(picture, mould, outline, output)
+    opt.require_writable(output, mould, outline, photo, kind="a JSON file")
+    opt.require_picture_writable(picture, mould, outline, photo, output)
+    opt.require_picture_writable(overlay, mould, outline, photo, output, picture)
+    if photo is not None:
+        ratios = _photographed(photo, shape, overlay, ratios, outline)
     found = raptor.fit(
         shape, *ratios, outline=outline, by=by, surrogate=model, start=start, layers=layers,
         accuracy=accuracy, simulations=simulations, error=error, seed=seed,
@@ -83,13 +99,30 @@ def fit(
     opt.report(f"{output}: {found}", numbers, as_json)
 
 
+def _photographed(
+    photo: Path,
+    mould: raptor.Mould,
+    overlay: Path | None,
+    given: tuple[float | None, float | None],
+    outline: Path | None,
+) -> tuple[float, float | None]:
+    """The ratios measured in a photograph, and an overlay to check them by."""
+    if given != (None, None) or outline is not None:
+        raise raptor.RaptorError(ONE_KIND)
+    measured = raptor.measure(photo, mould)
+    typer.echo(f"{photo}: {measured}", err=True)
+    opt.save_picture(measured, overlay)
+    width = measured.width_ratio
+    return measured.area_ratio, width if isfinite(width) else None
+
+
 def _measured(
     name: str, tissues: Path | None, given: tuple[float | None, float | None]
 ) -> tuple[float | None, float | None]:
     """The measured ratios of a tissue, where none are given besides."""
     tissue = raptor.tissue(name, tissues)
     if given != (None, None):
-        raise raptor.RaptorError("give one kind of measurement: ratios, --tissue NAME, or --outline")
+        raise raptor.RaptorError(ONE_KIND)
     if not tissue.measured:
         raise raptor.RaptorError(
             f"tissue {name} has no measured ratio to fit; give --area-ratio or --width-ratio"

@@ -5,6 +5,7 @@ evenly spaced points of the measured outline to the predicted one, positive if t
 both have sub-pixel precision (marching squares).
 """
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from skimage.filters import threshold_otsu
 from skimage.measure import find_contours
 
 from raptor.core.errors import RaptorError
+from raptor.core.files import read_json
 from raptor.core.pixels import read_pixels
 from raptor.fitting.least_squares import Minimum
 from raptor.fitting.targets import Measure, as_array, parameters_at
@@ -61,16 +63,19 @@ class Outline:
 
 
 def read_outline(path: Path, page: int | None = None) -> Outline:
-    """Read the outline of a tissue from a picture (PNG, JPEG, TIFF) whose frame is the image of 62.5 l0.
+    """Read the outline of a tissue: GeoJSON as `raptor measure` writes it, or a picture of the frame.
 
-    The tissue is what differs from the border of the picture; its edge is half-way between both colours
-    (Otsu). Crop the picture to the frame first: square, with the mould's centre in the middle.
+    A picture (PNG, JPEG, TIFF) shows the image of 62.5 l0: crop it to the frame first, square, with the
+    mould's centre in the middle. The tissue is what differs from the picture's border; its edge is half-way
+    between both colours (Otsu).
 
     Raises
     ------
     RaptorError
-        If the picture cannot be read, is not square, or shows no tissue.
+        If the file cannot be read, is no polygon, or the picture is not square or shows no tissue.
     """
+    if Path(path).suffix.lower() in (".geojson", ".json"):
+        return _drawn(Path(path))
     grey = _grey(Path(path), page)
     rim = np.concatenate([grey[0], grey[-1], grey[:, 0], grey[:, -1]])
     if grey.min() == grey.max():
@@ -79,6 +84,20 @@ def read_outline(path: Path, page: int | None = None) -> Outline:
     level = float(np.median(grey[dark]) + np.median(grey[~dark])) / 2  # half-way, where edges are soft
     excess = level - grey if np.median(rim) > level else grey - level
     return Outline.along(_pieces(excess[::-1], f"outline {path}"))  # the first row of a picture is on top
+
+
+def _drawn(path: Path) -> Outline:
+    """The outline in a GeoJSON file of one feature, l0."""
+    content = read_json(path)
+    try:
+        tissue = shapely.from_geojson(json.dumps(content.get("geometry", content)))
+    except (shapely.GEOSException, AttributeError, TypeError) as error:
+        raise RaptorError(f"outline {path} is not GeoJSON of one tissue: {error}") from error
+    if tissue is None or tissue.geom_type not in ("Polygon", "MultiPolygon") or tissue.is_empty:
+        raise RaptorError(f"outline {path} holds no polygon; give what raptor measure --outline writes")
+    if np.abs(tissue.bounds).max() > IMAGE_SIZE / 2:
+        raise RaptorError(f"outline {path} leaves the frame of {IMAGE_SIZE} l0; its lengths must be in l0")
+    return Outline.along(tissue)
 
 
 def outline_of(density: NDArray[np.floating], threshold: float) -> Outline:

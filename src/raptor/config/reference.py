@@ -12,7 +12,7 @@ from raptor.config.configuration import Configuration
 from raptor.core.errors import RaptorError
 from raptor.core.files import write_text
 
-DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about ten minutes on two cores.
+DEFAULTS_HEAD = """# The default: 64 simulations, a surrogate and a fit in about six minutes on two cores.
 # Every key is explained in config/README.md. Written by `raptor reference`.
 """
 README_HEAD = """# Configuration

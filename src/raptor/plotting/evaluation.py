@@ -43,7 +43,7 @@ def training_figure(history: pd.DataFrame) -> Figure:
         best = table.iloc[int(table["validation_error"].argmin())]
         errors.plot(best["epoch"], best["validation_error"], "o", color=colour)
         kept.append(float(best["validation_error"]))
-    losses.set(xlabel="epoch", ylabel="mean absolute error, scaled (dotted: discriminator)", yscale="log")
+    losses.set(xlabel="epoch", ylabel="training loss (dotted: discriminator)", yscale="log")
     losses.legend(frameon=False, fontsize=7)
     errors.set_title("weights kept: " + ", ".join(f"{value:.3f}" for value in kept))
     errors.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))

@@ -52,8 +52,8 @@ accuracy: {accuracy}. RAPTOR {version}, model version {model_version}.
 ## Cost
 {hours:.3f} {unit} in all; per simulation {median:.2f} s (median), {p95:.2f} s (95th percentile),
 {where}. Not converged: {unconverged} of {simulations}. Largest share of a
-tissue's bonds that inverted: {inverted:.2g}. Tissues that lost a tether: {lost}. Simulations of the design that failed and are
-missing: {missing}.
+tissue's bonds that inverted: {inverted:.2g}. Tissues that lost a tether: {lost}. Simulations of the
+design that failed and are missing: {missing}.
 
 ## How to evaluate another simulator against it
 Simulate the moulds of `moulds.geojson` at the parameters of `design.csv`, rasterise as above, and compare

@@ -87,7 +87,7 @@ def fit(
     opt.require_writable(output, mould, outline, photo, kind="a JSON file")
     opt.require_picture_writable(picture, mould, outline, photo, output)
     opt.require_picture_writable(overlay, mould, outline, photo, output, picture)
-    if photo is not None:
+    if photo is not None or overlay is not None:
         ratios = _photographed(photo, shape, overlay, ratios, outline)
     found = raptor.fit(
         shape, *ratios, outline=outline, by=by, surrogate=model, start=start, layers=layers,
@@ -100,13 +100,15 @@ def fit(
 
 
 def _photographed(
-    photo: Path,
+    photo: Path | None,
     mould: raptor.Mould,
     overlay: Path | None,
     given: tuple[float | None, float | None],
     outline: Path | None,
 ) -> tuple[float, float | None]:
     """The ratios measured in a photograph, and an overlay to check them by."""
+    if photo is None:
+        raise raptor.RaptorError("--overlay shows what was measured in a photograph; give --photo too")
     if given != (None, None) or outline is not None:
         raise raptor.RaptorError(ONE_KIND)
     measured = raptor.measure(photo, mould)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
-from urllib.error import HTTPError, URLError
+from urllib.error import HTTPError
 from urllib.parse import quote
 from urllib.request import Request, urlopen
 
@@ -113,7 +113,7 @@ def _opened(source: str, name: str, start: int) -> Iterator[tuple[BinaryIO | htt
         raise RaptorError(
             f"{where} cannot be read: the server answers {error.code} {error.reason}"
         ) from error
-    except (URLError, TimeoutError, ValueError, http.client.HTTPException) as error:
+    except (OSError, ValueError, http.client.HTTPException) as error:
         raise RaptorError(f"{where} cannot be reached: {getattr(error, 'reason', error)}; {AGAIN}") from error
     with response:
         yield response, response.status == http.client.PARTIAL_CONTENT

@@ -305,7 +305,7 @@ def test_fit_by_the_simulator_from_parameters_of_ones_own(tmp_path, what):
         (("--area-ratio", 0.5, *options()), "or --by simulator"),
         (("--area-ratio", 0.5, "--by", "simulator", *options(nnn=0.2)), "above kappa_nnn/sqrt(2)"),
         (("--area-ratio", 0.5, "--model", "nowhere"), "model.json cannot be read"),
-        (("--outline", MOULD), "holds no polygon; give what raptor measure --outline writes"),
+        (("--outline", MOULD), "is a mould; give the tissue's, from raptor measure --outline"),
         (("--area-ratio", 0.5, "--picture", "a.gif"), "a.gif is not a picture's name"),
     ],
 )

@@ -72,6 +72,8 @@ def test_an_outline_is_read_from_geojson(tmp_path):
     path, tissue = tmp_path / "tissue.geojson", shapely.Point(0, 0).buffer(10)
     path.write_text(json.dumps({"type": "Feature", "geometry": mapping(tissue), "properties": {}}))
     assert np.allclose(read_outline(path).points, Outline.along(tissue).points)
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [json.loads(path.read_text())]}))
+    assert np.allclose(read_outline(path).points, Outline.along(tissue).points)
     for content, message in (
         ({"type": "Feature", "geometry": mapping(shapely.Point(0, 0))}, "holds no polygon"),
         ({"type": "Feature", "geometry": mapping(shapely.box(0, 0, 90, 9))}, "leaves the frame"),

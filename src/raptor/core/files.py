@@ -68,6 +68,8 @@ def read_json(path: Path) -> Any:
     """
     try:
         return json.loads(decoded(Path(path).read_bytes(), str(path)))
+    except RaptorError:
+        raise
     except OSError as error:
         raise RaptorError(f"{path} cannot be read: {error.strerror}") from error
     except ValueError as error:

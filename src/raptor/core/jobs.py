@@ -63,12 +63,17 @@ def hold_lock(path: Path, what: str) -> None:
     Raises
     ------
     RaptorError
-        If another process holds it.
+        If another process holds it, or its folder cannot be written.
     """
     import fcntl  # not on Windows
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-    file = os.open(path, os.O_RDWR | os.O_CREAT)  # closed with the process, and not passed on to its jobs
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)  # closed with the process; jobs do not inherit it
+    except OSError as error:
+        raise RaptorError(
+            f"{path} cannot be written: {error.strerror}; results need a folder of yours"
+        ) from error
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:

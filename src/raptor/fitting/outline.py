@@ -90,6 +90,10 @@ def _drawn(path: Path) -> Outline:
     """The outline in a GeoJSON file of one feature, l0."""
     content = read_json(path)
     try:
+        if len(content.get("features", ())) == 1:
+            (content,) = content["features"]
+        if "tethers" in (content.get("properties") or {}):
+            raise RaptorError(f"outline {path} is a mould; give the tissue's, from raptor measure --outline")
         tissue = shapely.from_geojson(json.dumps(content.get("geometry", content)))
     except (shapely.GEOSException, AttributeError, TypeError) as error:
         raise RaptorError(f"outline {path} is not GeoJSON of one tissue: {error}") from error

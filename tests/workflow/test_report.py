@@ -91,7 +91,7 @@ def test_the_report_is_seen(results, tmp_path):
 def test_the_technical_report_opens(results, tmp_path):
     done = browse(results / "workflow.html", tmp_path, "--dump-dom")
     assert not [line for line in console(done) if "tailwindcss" not in line]  # advice to its authors
-    assert "CONDOR" in done.stdout
+    assert "How RAPTOR run" in done.stdout
 
 
 def test_the_report_holds_all_that_it_shows(results):

@@ -21,6 +21,11 @@ def raptor(*arguments):
     return CompletedProcess(command, end.value.code or 0, out.getvalue(), err.getvalue())
 
 
+def options(delta=0.5, nnn=0.5, nnnn=0.3):
+    """Parameters as flags."""
+    return ("--delta", delta, "--kappa-nnn", nnn, "--kappa-nnnn", nnnn)
+
+
 def module(name, *arguments):
     """What `python -m name ...` prints."""
     printed, command = StringIO(), [name, *map(str, arguments)]

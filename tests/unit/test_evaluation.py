@@ -180,8 +180,8 @@ def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
     assert regions.loc["all", "samples"] == 2
     below = int((metrics["delta"] < 0.3).sum())
     assert regions.loc["delta below 0.3", "samples"] == below
-    costs = costs_of(surrogate, {"threads": 2}, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]}))
-    assert costs["training_core_minutes"] == pytest.approx(2.0)
+    costs = costs_of(surrogate, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]}))
+    assert costs["training_core_minutes"] == pytest.approx(1.0)
     assert costs["all_ms"] > 0
 
 

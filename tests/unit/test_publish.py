@@ -38,7 +38,8 @@ def test_it_is_whole_and_every_netcdf_states_its_licence(published):
     made = {path.relative_to(published).as_posix() for path in published.rglob("*") if path.is_file()}
     assert {
         "README.md", "croissant.json", "ro-crate-metadata.json", MANIFEST, "code/Snakefile", "code/LICENSE",
-        "code/workflow/rules/publish.smk", "code/workflow/scripts/publish.py", "surrogate/README.md",
+        "code/workflow/rules/publish.smk", "code/workflow/scripts/publish.py", "code/workflow/env",
+        "code/config/laptop.yaml", "code/src/raptor/__init__.py", "surrogate/README.md",
         "surrogate/weights.safetensors", "campaigns/paper/card.md", "campaigns/paper/design.csv",
         "campaigns/paper/moulds.geojson", "campaigns/paper/shards/00000-00007.nc",
         "well/paper/data/test/raptor.hdf5",
@@ -214,3 +215,5 @@ def test_files_of_the_run_take_no_room_twice(tmp_path):
     assert plain.stat().st_ino == (tmp_path / "published" / "design.csv").stat().st_ino
     with pytest.raises(RaptorError, match="does not exist; make it with the workflow"):
         place(tmp_path / "none.csv", tmp_path / "published" / "none.csv")
+    with pytest.raises(RaptorError, match="design.csv/below cannot be written: "):
+        place(plain, plain / "below")

@@ -20,7 +20,7 @@ with logged(snakemake.log[0]):
     for weights, history in zip(snakemake.input.weights, snakemake.input.histories, strict=True):
         folder = Path(weights).parent
         trained[folder.name] = read_description(folder)["training"]
-        costs[folder.name] |= costs_of(load(folder), trained[folder.name], pd.read_csv(history))
+        costs[folder.name] |= costs_of(load(folder), pd.read_csv(history))
     with atomic_path(Path(snakemake.output.table)) as path:
         compare(on_main, costs.values()).to_csv(path, index=False)
     with atomic_path(Path(snakemake.output.campaigns)) as path:

@@ -1,5 +1,6 @@
 """raptor measure: area ratio, width ratio and outline of a tissue in a photograph."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -60,6 +61,8 @@ def measure(
     opt.save_picture(measured, overlay)
     if outline is not None:
         measured.save(outline)
-    ratios = f"--area-ratio {measured.area_ratio:.4f} --width-ratio {measured.width_ratio:.4f}"
+    ratios = f"--area-ratio {measured.area_ratio:.4f}"
+    if isfinite(measured.width_ratio):
+        ratios += f" --width-ratio {measured.width_ratio:.4f}"
     then = f"raptor fit {opt.words(mould, scale, mm_per_l0, mould_page)} {ratios} --output fit.json"
     opt.report(f"{image}: {measured}", measured.numbers, as_json, then)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.croissant import format_of
 from raptor.dataset.netcdf import LICENCE_URL
@@ -18,8 +18,8 @@ PROFILES = (
 METADATA = "ro-crate-metadata.json"
 
 
-def write_crate(folder: Path, name: str, sums: Mapping[str, str]) -> None:
-    """Write the crate's metadata.
+def write_crate(folder: Path, name: str, sums: Mapping[str, str]) -> Path:
+    """Write and return the crate's metadata.
 
     Parameters
     ----------
@@ -64,5 +64,5 @@ def write_crate(folder: Path, name: str, sums: Mapping[str, str]) -> None:
             "startTime": begun, "endTime": ended, "actionStatus": "http://schema.org/CompletedActionStatus",
         },
     )  # fmt: skip
-    with atomic_path(folder / METADATA) as path:
-        path.write_text(json.dumps(crate.metadata.generate(), indent=1, default=str) + "\n")
+    write_text(folder / METADATA, json.dumps(crate.metadata.generate(), indent=1, default=str) + "\n")
+    return folder / METADATA

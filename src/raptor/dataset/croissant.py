@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from raptor.core.files import atomic_path
+from raptor.core.files import write_text
 from raptor.core.version import __version__
 from raptor.dataset.netcdf import LICENCE_URL, REFERENCES
 
@@ -28,8 +28,8 @@ def format_of(name: str) -> str:
     return FORMATS.get(Path(name).suffix, "text/plain")
 
 
-def write_croissant(folder: Path, name: str, campaigns: Sequence[str], sums: Mapping[str, str]) -> None:
-    """Write croissant.json; mlcroissant validates it in building and again in reading it.
+def write_croissant(folder: Path, name: str, campaigns: Sequence[str], sums: Mapping[str, str]) -> Path:
+    """Write and return croissant.json; mlcroissant validates it in building and again in reading it.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ def write_croissant(folder: Path, name: str, campaigns: Sequence[str], sums: Map
         record_sets=[_records(folder, campaign) for campaign in campaigns],
     )
     path = folder / "croissant.json"
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(metadata.to_json(), indent=1, default=str) + "\n")
+    write_text(path, json.dumps(metadata.to_json(), indent=1, default=str) + "\n")
     mlc.Dataset(jsonld=path)
+    return path
 
 
 def _records(folder: Path, campaign: str) -> "mlcroissant.RecordSet":

@@ -97,7 +97,11 @@ def _opened(source: str, name: str, start: int) -> Iterator[tuple[BinaryIO | htt
         if not path.is_file():
             hint = f"; give a folder that the rule publish made, with {MANIFEST}" if name == MANIFEST else ""
             raise RaptorError(f"{path} does not exist{hint}")
-        with path.open("rb") as file:
+        try:
+            file = path.open("rb")
+        except OSError as error:
+            raise RaptorError(f"{path} cannot be read: {error.strerror}") from error
+        with file:
             file.seek(start)
             yield file, True
         return

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 import netCDF4
 
 from raptor.core.errors import RaptorError
-from raptor.core.files import atomic_path, read_text
+from raptor.core.files import read_text, write_text
 from raptor.core.version import MODEL_VERSION, __version__
 from raptor.dataset.crate import write_crate
 from raptor.dataset.croissant import write_croissant
@@ -23,11 +23,14 @@ TABLES = ("design.csv", "moulds.geojson", "examples.csv", "card.md", "checked.tx
 CODE = (
     "Snakefile",
     "LICENSE",
+    "README.md",
     "pyproject.toml",
     "environment-lock.txt",
-    "workflow/rules",
-    "workflow/scripts",
+    "workflow",
+    "config",
+    "src",
 )
+"""What makes the data again: the workflow, its default configuration and the package."""
 README = Path(__file__).with_suffix(".md")
 
 
@@ -38,7 +41,8 @@ def publish(
 
     Campaigns with shards, stack, tables and card; the stacks in The Well's layout; a model; the workflow and
     its configuration; README, checksums, Croissant and RO-Crate. Files of the run are hard links, which take
-    no room; copies where the disk has no such links or a file does not state its licence yet.
+    no room; copies where the disk has no such links or a file does not state its licence yet. Code is copied,
+    since an editor may change it in place.
 
     Parameters
     ----------
@@ -50,9 +54,10 @@ def publish(
     Raises
     ------
     RaptorError
-        If a file of a campaign is missing.
+        If a file of a campaign is missing, or a file cannot be written.
     """
-    shutil.rmtree(folder, ignore_errors=True)
+    if folder.exists():
+        shutil.rmtree(folder)
     for campaign in campaigns:
         source, target = results / "campaigns" / campaign, folder / "campaigns" / campaign
         for name in TABLES:
@@ -66,28 +71,40 @@ def publish(
         place(path, folder / "surrogate" / name)
     if (results / "configuration.yaml").is_file():
         place(results / "configuration.yaml", folder / "configuration.yaml")
+    (folder / "code").mkdir(parents=True)
     for name in CODE:
-        found = [code / name] if (code / name).is_file() else sorted((code / name).glob("*.[sp][my]*"))
-        for path in found:
-            place(path, folder / "code" / path.relative_to(code))
+        copy = shutil.copy2 if (code / name).is_file() else _copy_tree
+        copy(code / name, folder / "code" / name)
     _describe(folder, results.name, campaigns)
 
 
 def place(source: Path, target: Path) -> None:
     """Put a file into a published folder, as a hard link if it can be; a copy of netCDF gets the licence."""
-    target.parent.mkdir(parents=True, exist_ok=True)
+    if not source.is_file():
+        raise RaptorError(f"{source} does not exist; make it with the workflow")
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
         if source.suffix == ".nc" and not _is_licensed(source):
             shutil.copy2(source, target)
             with netCDF4.Dataset(target, "a") as file:
                 file.license = f"{LICENCE}, {LICENCE_URL}"
             shutil.copystat(source, target)
-            return
+        else:
+            _link(source, target)
+    except OSError as error:
+        raise RaptorError(f"{target} cannot be written: {error.strerror or error}") from error
+
+
+def _link(source: Path, target: Path) -> None:
+    """A hard link, or a copy on another disk or one without links."""
+    try:
         os.link(source, target)
-    except FileNotFoundError as error:
-        raise RaptorError(f"{source} does not exist; make it with the workflow") from error
     except OSError:
-        shutil.copy2(source, target)  # another disk, or one without links
+        shutil.copy2(source, target)
+
+
+def _copy_tree(source: Path, target: Path) -> None:
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
 
 
 def _is_licensed(path: Path) -> bool:
@@ -106,14 +123,11 @@ def _describe(folder: Path, name: str, campaigns: Sequence[str]) -> None:
         references=REFERENCES,
         first=campaigns[0],
     )
-    with atomic_path(folder / "README.md") as path:
-        path.write_text(text, encoding="utf-8")
+    write_text(folder / "README.md", text)
     sums = checksums(folder)
-    write_croissant(folder, name, campaigns, sums)
-    write_crate(folder, name, sums)
-    lines = [f"{digest}  {file}\n" for file, digest in checksums(folder).items()]
-    with atomic_path(folder / MANIFEST) as path:
-        path.write_text("".join(lines), encoding="utf-8")
+    about = [write_croissant(folder, name, campaigns, sums), write_crate(folder, name, sums)]
+    sums |= {path.name: digest_of(path) for path in about}
+    write_text(folder / MANIFEST, "".join(f"{digest}  {file}\n" for file, digest in sorted(sums.items())))
 
 
 def checksums(folder: Path) -> dict[str, str]:

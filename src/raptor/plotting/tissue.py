@@ -14,7 +14,6 @@ from raptor.fields.labelled import mould_of
 from raptor.moulds.geometry import Mould
 from raptor.plotting.drawing import HALF, SEQUENTIAL, STYLED, THIRD, new_figure
 from raptor.plotting.sweep import draw_directors
-from raptor.raster import density_threshold
 from raptor.symmetry import FIELDS
 
 if TYPE_CHECKING:
@@ -41,8 +40,7 @@ def tissue_figure(fields: "xr.Dataset") -> Figure:
     figure = new_figure(width, height + 0.55 + 0.19 * len(rows))
     top, bottom = figure.subplots(2, 1, height_ratios=[height, 0.19 * len(rows)])
     stack = np.stack([fields[name].to_numpy() for name in FIELDS])
-    threshold = density_threshold(int(fields.attrs["layers"]), stack.shape[-1])
-    threshold = float(fields.attrs.get("threshold", threshold))
+    threshold = float(fields.attrs["threshold"])
     as_cast = float(fields.attrs["n_cells"]) / float(fields["depression"].sum())
     shown = top.imshow(
         np.ma.masked_less(stack[0], threshold) / as_cast,

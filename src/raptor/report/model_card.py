@@ -51,7 +51,7 @@ def model_card(
         "surrogate": surrogate,
         "training": training,
         "passes": int(history["epoch"].max()) + 1,
-        "minutes": history["seconds"].sum() * training.get("threads", 1) / 60,
+        "minutes": history["seconds"].sum() / 60,
         "summaries": summaries,
         "regions": regions.to_dict("records"),
         "threshold_factor": surrogate.calibration.threshold_factor if surrogate.calibration else 1.0,

@@ -1,10 +1,8 @@
 """Cost of training and using a model."""
 
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from statistics import median
-from typing import Any
 
 import pandas as pd
 
@@ -17,10 +15,8 @@ PARAMETERS = CellParameters(0.5, 0.4, 0.2)
 REPEATS = 5
 
 
-def costs_of(
-    surrogate: Surrogate, training: Mapping[str, Any], history: pd.DataFrame
-) -> dict[str, float | str | int]:
-    """Number of weights, training time and milliseconds per prediction of a model.
+def costs_of(surrogate: Surrogate, history: pd.DataFrame) -> dict[str, float | str | int]:
+    """Number of weights, training time (one thread) and milliseconds per prediction of a model.
 
     Predictions of the eight fields in physical units: one image by one network, all eight images by one
     network, and those by all networks, on torch's threads; medians of a few.
@@ -32,7 +28,7 @@ def costs_of(
         "ensemble_size": len(surrogate.members),
         "weights": surrogate.weights,
         "epochs": int(history["epoch"].max()) + 1,
-        "training_core_minutes": float(history["seconds"].sum() * training.get("threads", 1) / 60),
+        "training_core_minutes": float(history["seconds"].sum() / 60),
         "one_image_ms": _milliseconds(one, averaged=False),
         "eight_images_ms": _milliseconds(one, averaged=True),
         "all_ms": _milliseconds(surrogate, averaged=True),

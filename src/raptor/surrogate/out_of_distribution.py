@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -105,30 +106,36 @@ class TrainingSet:
     points: NDArray[np.float32]
     usual: float = 1.0
 
+    @cached_property
+    def deviation(self) -> NDArray[np.float32]:
+        """Standard deviation (descriptors,) of the points, in which distances are measured."""
+        return np.asarray(self.points.std(axis=0) + 1e-6)
+
     def distance(self, point: NDArray[np.float64]) -> float:
         """Distance to the nearest point over the usual one, each descriptor over its deviation."""
-        deviation = self.points.std(axis=0) + 1e-6
-        nearest, _ = KDTree(self.points / deviation).query(point / deviation)
-        return float(nearest) / self.usual
+        return float(self._tree.query(point / self.deviation)[0]) / self.usual
 
     def unusual(self, point: NDArray[np.float64]) -> str:
         """The descriptor that is farthest out of the range that was trained on, its value and that range.
 
         Where each lies within its range, the one that differs most from the nearest training sample's.
         """
-        deviation = self.points.std(axis=0) + 1e-6
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        excess = np.maximum(low - point, point - high) / deviation
+        excess = np.maximum(low - point, point - high) / self.deviation
         number = int(excess.argmax())
         if excess[number] > 0:
             found = tuple(DESCRIPTORS.values())[number]
             lowest = found.text(low[number]).removesuffix(f" {found.unit}")
             trained_on = f"{lowest} to {found.text(high[number])}"
             return f"{found.words} {found.text(point[number])}; trained on {trained_on}"
-        _, nearest = KDTree(self.points / deviation).query(point / deviation)
-        number = int((np.abs(self.points[nearest] - point) / deviation).argmax())
+        nearest = int(self._tree.query(point / self.deviation)[1])
+        number = int((np.abs(self.points[nearest] - point) / self.deviation).argmax())
         found = tuple(DESCRIPTORS.values())[number]
         return (
             f"{found.words} {found.text(point[number])} with all else as it is; the nearest training sample "
             f"has {found.text(self.points[nearest, number])}"
         )
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        return KDTree(self.points / self.deviation)

@@ -215,5 +215,5 @@ def test_files_of_the_run_take_no_room_twice(tmp_path):
     assert plain.stat().st_ino == (tmp_path / "published" / "design.csv").stat().st_ino
     with pytest.raises(RaptorError, match="does not exist; make it with the workflow"):
         place(tmp_path / "none.csv", tmp_path / "published" / "none.csv")
-    with pytest.raises(RaptorError, match="design.csv/below cannot be written: "):
+    with pytest.raises(RaptorError, match=r"design\.csv/below cannot be written: "):
         place(plain, plain / "below")

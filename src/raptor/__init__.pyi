@@ -6,7 +6,7 @@ from .dataset.result import load_fields, save
 from .fitting.command import fit
 from .fitting.fitted import FittedTissue
 from .imaging.command import measure
-from .imaging.report import MeasuredPhotograph
+from .imaging.report import MeasuredPhotograph, MeasurementError
 from .moulds.geometry import Circle, Mould
 from .moulds.library.tissues import MeasuredTissue, tissue
 from .moulds.reading import read_mould
@@ -24,6 +24,7 @@ __all__ = [
     "FittedTissue",
     "MeasuredPhotograph",
     "MeasuredTissue",
+    "MeasurementError",
     "Mould",
     "NetworkModel",
     "Prediction",

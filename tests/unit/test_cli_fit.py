@@ -19,11 +19,12 @@ MOULD = str(MOULDS["tenocyte"])
 def test_fit_by_a_surrogate_gives_intervals(tmp_path, quick_fits):
     output, picture = tmp_path / "fit.json", tmp_path / "fit.png"
     done = raptor(
-        "fit", MOULD, "--tissue", "glial_1", "--model", untrained(tmp_path),
+        "fit", MOULD, "--tissue", "glial_1", "--model", untrained(tmp_path), "--by", "surrogate",
         "--output", output, "--picture", picture, "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     numbers, content = json.loads(done.stdout), json.loads(output.read_text())
+    assert numbers["simulations"] == 0
     assert numbers["delta_lower"] <= numbers["delta_upper"]
     assert numbers["rss"] == pytest.approx(content["fit"]["rss"])
     assert content["target"] == {"area_ratio": 0.81404, "width_ratio": 0.7972}
@@ -33,17 +34,37 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path, quick_fits):
 def test_fit_to_a_photograph_fits_what_measure_measures(tmp_path, quick_fits):
     case = next(each for each in CASES if each.mould == "tenocyte")
     _, _, grey = case.made()
-    photo, output, overlay = (tmp_path / name for name in ("photo.png", "fit.json", "overlay.png"))
+    names = ("photo.png", "fit.json", "overlay.png", "picture.png")
+    photo, output, overlay, picture = (tmp_path / name for name in names)
     Image.fromarray(grey).save(photo)
-    options = ("--model", untrained(tmp_path), "--output", output)
-    done = raptor("fit", case.mould, "--photo", photo, "--overlay", overlay, *options)
+    options = ("--model", untrained(tmp_path), "--accuracy", "draft", "--output", output)
+    done = raptor("fit", case.mould, "--photo", photo, "--overlay", overlay, "--picture", picture, *options)
     assert done.returncode == 0, done.stderr
+    assert "l0 apart" in done.stdout
+    assert 1 <= json.loads(output.read_text())["simulations"] <= 3
+    assert picture.read_bytes().startswith(b"\x89PNG")
     measured = json.loads(raptor("measure", photo, "--mould", case.mould, "--json").stdout)
     target = json.loads(output.read_text())["target"]
     assert target == {name: measured[name] for name in ("area_ratio", "width_ratio")}
     assert overlay.read_bytes().startswith(b"\x89PNG")
     done = raptor("fit", case.mould, "--photo", photo, "--area-ratio", 0.5, *options)
     assert "give one kind of measurement" in done.stderr
+
+
+@pytest.mark.parametrize("command", ["measure", "fit"])
+def test_a_refused_photograph_still_writes_its_overlay(command, tmp_path):
+    photo, overlay = tmp_path / "photo.png", tmp_path / "overlay.png"
+    Image.fromarray(CASES[0].made()[2]).save(photo)
+    files = {
+        "measure": (photo, "--mould", MOULD),
+        "fit": (MOULD, "--photo", photo, "--output", tmp_path / "x"),
+    }
+    done = raptor(command, *files[command], "--overlay", overlay)
+    assert done.returncode == 1
+    assert "does not have the shape of tenocyte" in done.stderr
+    assert f"(see {overlay})" in done.stderr
+    assert overlay.read_bytes().startswith(b"\x89PNG")
+    assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize("what", ["ratios", "outline"])

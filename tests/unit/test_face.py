@@ -209,7 +209,9 @@ def test_a_fit_finds_parameters_and_says_what_is_left_open(tissue, mould):
     assert found.rank < 3
     assert found.numbers["delta"] == found.parameters.delta
     assert "other parameters fit equally well" in str(found)
-    assert raptor.plot(found).axes[0].get_title() == "simulator"
+    assert found.tissue.parameters == found.parameters
+    assert found.apart(mould.outline.buffer(-1)) > 0
+    assert len(raptor.plot(found).axes) == 6  # tissue and its scale, words, three parameters
 
 
 def test_a_fit_takes_an_outline_in_l0(mould):
@@ -227,7 +229,7 @@ def test_a_fit_takes_an_outline_in_l0(mould):
         ({}, "give one kind of measurement"),
         ({"area_ratio": 0.7, "outline": "a.png"}, "give one kind of measurement"),
         ({"area_ratio": 70}, "lies between 0 and 1.5"),
-        ({"area_ratio": 0.7, "by": "eye"}, "allowed are surrogate, simulator"),
+        ({"area_ratio": 0.7, "by": "eye"}, "allowed are corrected, surrogate, simulator"),
         (
             {"area_ratio": 0.7, "start": raptor.CellParameters(0.5, 0.5, 0.3)},
             "start parameters need a fit by the simulator",

@@ -89,6 +89,17 @@ def test_a_posterior_shows_the_valley():
     assert values[heights.argmax()] == pytest.approx(TRUTH.delta, abs=0.1)
 
 
+def test_a_corrected_survey_moves_the_posterior_to_where_the_simulator_has_it():
+    """The surrogate is wrong by a constant; taking it away gives the posterior of one that is right."""
+    found, wrong = surveyed(), np.array([0.03, np.nan])
+    target = Target(*smooth([TRUTH])[0])
+    biased = infer(found.shifted(wrong), target, 0, dense=2**12)
+    right = infer(found.shifted(wrong).shifted(-wrong), target, 0, dense=2**12)
+    assert right.weights == pytest.approx(infer(found, target, 0, dense=2**12).weights)
+    assert abs(biased.weights - right.weights).max() > 1e-4
+    assert smooth([parameters_at(right.middle)])[0] == pytest.approx(smooth([TRUTH])[0], abs=0.005)
+
+
 def test_the_surrogates_error_widens_intervals():
     target = Target(*smooth([TRUTH])[0])
     widths = [

@@ -8,8 +8,9 @@ import typer
 
 import raptor
 from raptor.cli import options as opt
+from raptor.core.jobs import progress
 
-By = Literal["surrogate", "simulator"]
+By = Literal["corrected", "surrogate", "simulator"]
 ONE_KIND = "give one kind of measurement: ratios, --tissue NAME, --photo, or --outline"
 
 
@@ -27,15 +28,26 @@ Photo = Annotated[
     typer.Option(help="photograph of the tissue in its mould, measured first as by raptor measure"),
 ]
 Overlay = Annotated[Path | None, typer.Option(help="with --photo: picture of what was measured, to check")]
-Model = Annotated[By, typer.Option(help="fit by the surrogate alone, or continue with the simulator")]
+Model = Annotated[
+    By,
+    typer.Option(
+        help="by the surrogate, corrected by a few simulations; by the surrogate alone; or with a further "
+        "search by the simulator"
+    ),
+]
 Layers = Annotated[int | None, typer.Option(help="cell layers of simulations [those of the surrogate]")]
 Accuracy = Annotated[str, typer.Option(help="accuracy of simulations: draft, standard or reference")]
-Simulations = Annotated[int, typer.Option(min=1, help="largest number of simulations")]
+Simulations = Annotated[
+    int | None, typer.Option(min=1, help="largest number of simulations [3, or 40 by the simulator]")
+]
 Error = Annotated[
     float | None, typer.Option(help="standard error of a ratio [0.01], or of the outline in l0 [0.25]")
 ]
 Seed = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="seed of every random number")]
-Picture = Annotated[Path | None, typer.Option(help="picture of the fitted tissue to write (PNG or SVG)")]
+Picture = Annotated[
+    Path | None,
+    typer.Option(help="picture of the fitted tissue and of what the fit leaves open (PNG, SVG or PDF)"),
+]
 
 
 def fit(
@@ -48,7 +60,7 @@ def fit(
     outline: Outline = None,
     photo: Photo = None,
     overlay: Overlay = None,
-    by: Model = "surrogate",
+    by: Model = "corrected",
     model: opt.Surrogate = None,
     delta: opt.Delta = None,
     kappa_nnn: opt.KappaNNN = None,
@@ -58,7 +70,7 @@ def fit(
     page: opt.Page = None,
     layers: Layers = None,
     accuracy: Accuracy = "standard",
-    simulations: Simulations = 40,
+    simulations: Simulations = None,
     error: Error = None,
     seed: Seed = 0,
     picture: Picture = None,
@@ -68,15 +80,15 @@ def fit(
 
     Give a photograph of the tissue in its mould, one or both measured ratios, the name of a tissue of the
     library, or its whole outline. Two ratios cannot determine three parameters; the intervals in the output
-    show what they leave open (docs/fits.md). With --by simulator the search continues from the surrogate's
-    fit, or starts from given parameters without a surrogate.
+    show what they leave open (docs/fits.md). Three simulations correct the surrogate's fit. With --by
+    simulator the search continues from there, or starts from given parameters without a surrogate.
 
     Example:
       raptor fit glial_1 --tissue glial_1 --output fit.json
       raptor fit mould.svg --area-ratio 0.75 --width-ratio 0.70
           --output fit.json --picture fit.png
       raptor fit mould.svg --photo photograph.png --overlay overlay.png
-          --by simulator --simulations 8 --output fit.json --picture fit.png
+          --output fit.json --picture fit.png
       raptor fit mould.svg --outline tissue.png --by simulator --output fit.json
     """
     ratios, parameters = (area_ratio, width_ratio), (delta, kappa_nnn, kappa_nnnn)
@@ -87,16 +99,31 @@ def fit(
     opt.require_writable(output, mould, outline, photo, kind="a JSON file")
     opt.require_picture_writable(picture, mould, outline, photo, output)
     opt.require_picture_writable(overlay, mould, outline, photo, output, picture)
+    photograph = None
     if photo is not None or overlay is not None:
-        ratios = _photographed(photo, shape, overlay, ratios, outline)
-    found = raptor.fit(
-        shape, *ratios, outline=outline, by=by, surrogate=model, start=start, layers=layers,
-        accuracy=accuracy, simulations=simulations, error=error, seed=seed,
-    )  # fmt: skip
+        photograph = _photographed(photo, shape, overlay, ratios, outline)
+        ratios = photograph.area_ratio, photograph.width_ratio if isfinite(photograph.width_ratio) else None
+    with progress("fit", None) as advance:
+        found = raptor.fit(
+            shape, *ratios, outline=outline, by=by, surrogate=model, start=start, layers=layers,
+            accuracy=accuracy, simulations=simulations, error=error, seed=seed, on_progress=advance,
+        )  # fmt: skip
     found.save(output)
-    opt.save_picture(found, picture)
+    opt.save_picture(found, picture, photograph=photograph)
     numbers = found.numbers | {"mm_per_l0": shape.mm_per_l0, "output": output, "picture": picture}
-    opt.report(f"{output}: {found}", numbers, as_json)
+    sentence = f"{output}: {found}"
+    if photograph is not None:
+        apart = found.apart(photograph.outline)
+        numbers["outlines_apart"] = apart
+        sentence += f"\noutlines    {apart:.2f} l0 apart, root mean square, in the photograph and at the fit"
+    opt.report(sentence, numbers, as_json, _then(found, opt.words(mould, scale, mm_per_l0, page), picture))
+
+
+def _then(found: raptor.FittedTissue, mould: str, picture: Path | None) -> str:
+    """The next command: the whole tissue at the fit."""
+    p = found.parameters
+    point = f"--delta {p.delta:.4g} --kappa-nnn {p.kappa_nnn:.4g} --kappa-nnnn {p.kappa_nnnn:.4g}"
+    return f"raptor simulate {mould} {point} --output tissue.nc --picture tissue.png"
 
 
 def _photographed(
@@ -105,17 +132,15 @@ def _photographed(
     overlay: Path | None,
     given: tuple[float | None, float | None],
     outline: Path | None,
-) -> tuple[float, float | None]:
-    """The ratios measured in a photograph, and an overlay to check them by."""
+) -> raptor.MeasuredPhotograph:
+    """What is measured in a photograph, and an overlay to check it by."""
     if photo is None:
         raise raptor.RaptorError("--overlay shows what was measured in a photograph; give --photo too")
     if given != (None, None) or outline is not None:
         raise raptor.RaptorError(ONE_KIND)
-    measured = raptor.measure(photo, mould)
+    measured = opt.measured(photo, mould, overlay)
     typer.echo(f"{photo}: {measured}", err=True)
-    opt.save_picture(measured, overlay)
-    width = measured.width_ratio
-    return measured.area_ratio, width if isfinite(width) else None
+    return measured
 
 
 def _measured(

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-import raptor
 from raptor.cli import options as opt
 
 Photograph = Annotated[Path, typer.Argument(help="photograph, or two-valued mask (PNG, TIFF, JPEG)")]
@@ -54,11 +53,10 @@ def measure(
     if outline is not None:
         opt.require_writable(outline, image, mould, kind="a GeoJSON file")
     shape = opt.read_mould(mould, scale, mm_per_l0, mould_page)
-    measured = raptor.measure(
-        image, shape, look=look, threshold=threshold, landmarks=landmarks or (), aligned=aligned,
+    measured = opt.measured(
+        image, shape, overlay, look=look, threshold=threshold, landmarks=landmarks or (), aligned=aligned,
         mirrored=mirrored, page=page, channel=channel,
     )  # fmt: skip
-    opt.save_picture(measured, overlay)
     if outline is not None:
         measured.save(outline)
     ratios = f"--area-ratio {measured.area_ratio:.4f}"

@@ -129,12 +129,26 @@ def require_picture_writable(picture: Path | None, *others: Path | None) -> None
         require_writable(picture, *others, kind="a picture")
 
 
-def save_picture(what: Any, picture: Path | None, fields: bool = False) -> None:
+def save_picture(what: Any, picture: Path | None, **options: Any) -> None:
     """Write what `raptor.plot` draws, if a picture is requested."""
     if picture is not None:
         from raptor.plotting import save_picture
 
-        save_picture(raptor.plot(what, fields=fields), picture)
+        save_picture(raptor.plot(what, **options), picture)
+
+
+def measured(
+    photograph: Path, mould: raptor.Mould, overlay: Path | None, **options: Any
+) -> raptor.MeasuredPhotograph:
+    """Measure a photograph and write its overlay, which shows a refused one too."""
+    try:
+        found = raptor.measure(photograph, mould, **options)
+    except raptor.MeasurementError as refused:
+        save_picture(refused, overlay)
+        seen = f"see {overlay}" if overlay is not None else "--overlay FILE.png shows how far it came"
+        raise raptor.RaptorError(f"{photograph}: {refused} ({seen})") from refused
+    save_picture(found, overlay)
+    return found
 
 
 def finish(
@@ -142,7 +156,7 @@ def finish(
 ) -> None:
     """Write a tissue or a prediction and its picture, and print a summary and the next command."""
     raptor.save(result, output)
-    save_picture(result, picture, fields)
+    save_picture(result, picture, fields=fields)
     numbers = result.numbers | {"mm_per_l0": result.mould.mm_per_l0, "output": output, "picture": picture}
     if not then and picture is None:
         then = f"raptor plot {quote(output)} --output {quote(output.with_suffix('.png'))}"

@@ -23,5 +23,5 @@ def plot(
       raptor plot tissue.nc --output tissue.pdf
     """
     opt.require_picture_writable(output, result)
-    opt.save_picture(raptor.load_fields(result), output, fields)
+    opt.save_picture(raptor.load_fields(result), output, fields=fields)
     typer.echo(f"{output}: {result}")

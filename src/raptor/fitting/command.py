@@ -1,95 +1,37 @@
 """Fits as a user asks for them: to ratios or an outline, by the surrogate or the simulator."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import get_args
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from raptor.condor.simulate import PIXELS
+from raptor.condor.simulate import PIXELS, Tissue
 from raptor.core.errors import RaptorError
-from raptor.fields.shape import shape_ratios
 from raptor.fitting.fitted import FittedTissue
-from raptor.fitting.least_squares import Minimum, Residuals, minimise
-from raptor.fitting.outline import Densities, Outline, deviations, outline_measure, read_outline
-from raptor.fitting.posterior import RATIO_ERROR, infer, summarise, survey
+from raptor.fitting.least_squares import STEP as SMALL_STEP
+from raptor.fitting.least_squares import Minimum, descend, minimise
+from raptor.fitting.outline import Outline, deviations, read_outline
+from raptor.fitting.posterior import RATIO_ERROR, Posterior, infer, summarise, survey
+from raptor.fitting.request import By, Request
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
-from raptor.fitting.space_mapping import correct
-from raptor.fitting.targets import (
-    PARAMETERS,
-    Measure,
-    Target,
-    as_array,
-    surrogate_densities,
-    surrogate_measure,
-    unit_of,
-)
+from raptor.fitting.space_mapping import TOLERANCE, correct
+from raptor.fitting.targets import PARAMETERS, Measure, Target, as_array, unit_of
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, NetworkModel, require_parameters
-from raptor.raster import density_threshold
 from raptor.surrogate.command import load_surrogate
 from raptor.surrogate.inference import Surrogate
-
-By = Literal["surrogate", "simulator"]
-"""The model used by a fit."""
+from raptor.surrogate.prediction import Prediction
 
 OUTLINE_ERROR = 0.25
 LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
-CORRECTED = 4  # one in so many simulations may be used to correct the surrogate's fit
+CORRECTED = 4  # of a fit by the simulator, one in so many simulations may correct the surrogate's fit
+SIMULATIONS: dict[str, int] = {"surrogate": 0, "corrected": 3, "simulator": 40}
+DRAWS = 200  # from the posterior, to draw
 NORMAL = 1.96  # standard deviations to an end of a 95 % interval
-
-
-@dataclass(frozen=True)
-class Request:
-    """A request for a fit.
-
-    Parameters
-    ----------
-    mould : Mould
-    target : Target or Outline
-        The measurement.
-    simulator : Simulator
-    surrogate : Surrogate or None
-        None if the simulator starts from `start`.
-    start : CellParameters or None
-    by_simulator : bool
-        Whether the simulator continues from the surrogate's fit or from the start.
-    simulations : int
-        Largest number of simulations.
-    error : float or None
-        Standard error of a ratio, or of the outline in l0; None for the default.
-    """
-
-    mould: Mould
-    target: Target | Outline
-    simulator: Simulator
-    surrogate: "Surrogate | None"
-    start: CellParameters | None
-    by_simulator: bool
-    simulations: int
-    error: float | None
-
-    @property
-    def threshold(self) -> float:
-        """Density per pixel above which there is tissue, for the model that ends the fit."""
-        if self.surrogate is not None and not self.by_simulator:
-            return self.surrogate.threshold
-        return density_threshold(self.simulator.model.layers, self.simulator.pixels)
-
-    def measure(self, densities: Densities, ratios: Measure, threshold: float) -> tuple[Measure, Residuals]:
-        """The measured quantities and their residuals."""
-        if isinstance(self.target, Outline):
-            return outline_measure(densities, self.target, threshold), np.asarray
-        return ratios, self.target.residuals
-
-    def simulated(self, parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
-        """Densities (n, y, x) of simulated tissues."""
-        runs = [self.simulator.run(self.mould, each) for each in parameters]
-        return np.array([self.simulator.fields(run)[0] for run in runs])
 
 
 def fit(
@@ -98,20 +40,21 @@ def fit(
     width_ratio: float | None = None,
     *,
     outline: Outline | shapely.Geometry | str | Path | None = None,
-    by: By = "surrogate",
+    by: By = "corrected",
     surrogate: Surrogate | str | Path | None = None,
     start: CellParameters | None = None,
     layers: int | None = None,
     accuracy: str = "standard",
-    simulations: int = 40,
+    simulations: int | None = None,
     error: float | None = None,
     seed: int = 0,
+    on_progress: Callable[[str], None] = lambda note: None,
 ) -> FittedTissue:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
     Two ratios cannot determine three parameters; the intervals show what they leave open (docs/fits.md). For
-    ratios the intervals are those of the surrogate's posterior, for an outline they follow from the
-    derivatives at the fit.
+    ratios the intervals are those of the posterior by the surrogate, corrected where simulations ended the
+    fit; for an outline they follow from the derivatives at the fit.
 
     Parameters
     ----------
@@ -123,24 +66,28 @@ def fit(
         The tissue's outline (l0), such as from `measure`, instead of ratios; or a picture of it, cropped to
         the frame of 62.5 l0.
     by : str
-        "surrogate", or "simulator" to continue from the surrogate's fit with simulations.
+        "corrected": by the surrogate, whose error at the fit a few simulations take away; "surrogate":
+        without these; "simulator": continue from there with simulations.
     surrogate : Surrogate, str, Path or None
         A surrogate or its folder; None for the shipped one.
     start : CellParameters, optional
         Start of a fit by the simulator without a surrogate.
     layers, accuracy : int, str
         Of simulations, as in `simulate`; by default the surrogate's layers, or 7 without one.
-    simulations : int
-        Largest number of simulations.
+    simulations : int, optional
+        Largest number of simulations: 3 of a corrected fit, 40 of one by the simulator.
     error : float, optional
         Standard error of a ratio (0.01), or of the outline (0.25 l0).
     seed : int
         Of every random number.
+    on_progress : callable, optional
+        Called with a note after each step.
 
     Raises
     ------
     RaptorError
-        If an argument is not allowed, or the measurement is not possible on the mould.
+        If an argument is not allowed, the surrogate is not calibrated, or the measurement is not possible on
+        the mould.
 
     Examples
     --------
@@ -151,7 +98,10 @@ def fit(
     used = _surrogate(surrogate, layers) if start is None else None
     model = NetworkModel(used.layers if used is not None else layers or 7)
     simulator = Simulator(model, accuracy, used.pixels if used is not None else PIXELS, seed)
-    return _fit(Request(mould, target, simulator, used, start, by == "simulator", simulations, error))
+    simulations = SIMULATIONS[by] if simulations is None else simulations
+    if simulations < 1 and by != "surrogate":
+        raise RaptorError(f'simulations is {simulations}; give 1 or more, or by="surrogate"')
+    return _fit(Request(mould, target, simulator, used, start, by, simulations, error, on_progress))
 
 
 def _start(start: CellParameters | None, by: str) -> CellParameters | None:
@@ -160,7 +110,7 @@ def _start(start: CellParameters | None, by: str) -> CellParameters | None:
         raise RaptorError(f"by is '{by}'; allowed are {', '.join(get_args(By))}")
     if start is None:
         return None
-    if by == "surrogate":
+    if by != "simulator":
         raise RaptorError('start parameters need a fit by the simulator: by="simulator", or --by simulator')
     return require_parameters(start).require_sampled("fit")
 
@@ -172,6 +122,11 @@ def _surrogate(surrogate: Surrogate | str | Path | None, layers: int | None) -> 
         raise RaptorError(
             f"layers is {layers}, but this surrogate is for {loaded.layers}; omit it, or start the "
             "simulator from your own parameters"
+        )
+    if loaded.calibration is None:
+        raise RaptorError(
+            "this model's errors were not calibrated, so a fit by it cannot say what it leaves open; use a "
+            "model written by the workflow's rule assemble_model"
         )
     return loaded
 
@@ -202,84 +157,91 @@ def _target(
 
 def _fit(request: Request) -> FittedTissue:
     """The requested fit."""
-    found, measure, densities = _search(request)
-    density = densities([found.parameters])[0]
-    area, width = map(float, shape_ratios(density, request.simulator.cast(request.mould), request.threshold))
-    intervals: dict[str, tuple[float, float]] = {}
-    posterior: dict[str, Any] = {}
-    if isinstance(request.target, Outline):
-        intervals = _intervals(request, request.target, measure, found)
-    elif request.surrogate is not None and request.surrogate.calibration is not None:
-        posterior = _posterior(request, request.surrogate, request.target)
-        quantiles = {name: known["quantiles"] for name, known in posterior["parameters"].items()}
-        intervals = {name: (known["0.025"], known["0.975"]) for name, known in quantiles.items()}
+    target, surrogate, posterior = request.target, request.surrogate, None
+    if surrogate is None or isinstance(target, Outline):
+        found = _search(request)
+    else:
+        found, posterior = _search_ratios(request, surrogate, target)
+    intervals = _intervals(request, target, found) if isinstance(target, Outline) else {}
+    known = {} if posterior is None else summarise(posterior)
+    if posterior is not None:
+        quantiles = {name: known["parameters"][name]["quantiles"] for name in PARAMETERS}
+        intervals = {name: (each["0.025"], each["0.975"]) for name, each in quantiles.items()}
     return FittedTissue(
         request.mould,
-        request.target,
-        "simulator" if request.by_simulator else "surrogate",
+        target,
+        request.by,
         request.simulator.model.layers,
+        len(request.tissues),
         found,
-        area,
-        width,
+        _tissue(request, found.parameters),
         intervals,
-        posterior.get("reachable"),
-        posterior,
-        density,
-        request.threshold,
+        known,
+        np.empty((0, 3)) if posterior is None else posterior.parameters[posterior.draws(DRAWS, 0)],
     )
 
 
-def _search(request: Request) -> tuple[Minimum, Measure, Densities]:
-    """The minimum by the surrogate, or by the simulator from there or from the start."""
-    if request.surrogate is not None:
-        (start_by, residuals), (measure, _) = (
-            request.measure(
-                surrogate_densities(request.surrogate, request.mould, averaged=averaged),
-                surrogate_measure(request.surrogate, request.mould, averaged=averaged),
-                request.surrogate.threshold,
-            )
-            for averaged in (False, True)
-        )
-        seed = request.simulator.seed
-        found = minimise(start_by, residuals, seed=seed, fine=measure)
-        if not request.by_simulator:
-            return found, measure, surrogate_densities(request.surrogate, request.mould, averaged=True)
-        return _corrected(request, found, measure)
-    assert request.start is not None, "a fit needs a surrogate or a start"
-    measure, residuals = _by_simulation(request)
-    found = descend_by_simulation(measure, residuals, unit_of(request.start), request.simulations)
-    return found, measure, request.simulated
+def _tissue(request: Request, parameters: CellParameters) -> Tissue | Prediction:
+    """The tissue at the fit, by the model that ended it."""
+    if request.by != "surrogate":
+        return request.simulate(parameters)
+    assert request.surrogate is not None
+    return request.surrogate.examine(request.mould, parameters)
 
 
-def _corrected(request: Request, found: Minimum, predicted: Measure) -> tuple[Minimum, Measure, Densities]:
-    """The surrogate's fit corrected by simulations, then a search by the simulator with the rest."""
-    measure, residuals = _by_simulation(request)
-    budget = max(1, request.simulations // CORRECTED)
+def _search_ratios(request: Request, surrogate: Surrogate, target: Target) -> tuple[Minimum, Posterior]:
+    """The fit to ratios and its posterior.
+
+    The search by the surrogate starts in the middle of the valley. Where simulations end it, the
+    surrogate's error at the best of them is taken from its predictions everywhere.
+    """
+    seed, error = request.simulator.seed, request.error or RATIO_ERROR
+    seen = survey(surrogate, request.mould, seed, on_progress=request.on_progress)
+    posterior = infer(seen, target, seed, error)
+    predicted, residuals = request.predicted(averaged=True)
+    found = descend(
+        predicted, residuals, posterior.middle,
+        budget=10**9, step=SMALL_STEP, enough=0.0, tolerance=TOLERANCE,
+    )  # fmt: skip
+    request.on_progress("fit by the surrogate")
+    if request.by == "surrogate":
+        return found, posterior
+    found = _corrected(request, found, predicted)
+    shift = found.measured - predicted([found.parameters])[0]
+    return found, infer(seen.shifted(shift), target, seed, error)
+
+
+def _search(request: Request) -> Minimum:
+    """The fit to an outline, or by the simulator from the start that was given."""
+    if request.surrogate is None:
+        assert request.start is not None, "a fit needs a surrogate or a start"
+        measure, residuals = request.simulated()
+        return descend_by_simulation(measure, residuals, unit_of(request.start), request.simulations)
+    start_by, residuals = request.predicted(averaged=False)
+    predicted, _ = request.predicted(averaged=True)
+    found = minimise(start_by, residuals, seed=request.simulator.seed, fine=predicted)
+    request.on_progress("fit by the surrogate")
+    return found if request.by == "surrogate" else _corrected(request, found, predicted)
+
+
+def _corrected(request: Request, found: Minimum, predicted: Measure) -> Minimum:
+    """The surrogate's fit corrected by simulations, and by the simulator searched on from there."""
+    measure, residuals = request.simulated()
+    budget = request.simulations if request.by == "corrected" else max(1, request.simulations // CORRECTED)
     best = correct(found, predicted, measure, residuals, budget=budget, enough=ENOUGH)
     left = request.simulations - best.evaluations
-    if best.rss > ENOUGH and left > 0:
+    if request.by == "simulator" and best.rss > ENOUGH and left > 0:
         last = descend_by_simulation(measure, residuals, best.unit, left)
         spent = best.evaluations + last.evaluations
         best = replace(min(best, last, key=lambda each: each.rss), evaluations=spent)
-    return best, measure, request.simulated
+    return best
 
 
-def _by_simulation(request: Request) -> tuple[Measure, Residuals]:
-    """The measured quantities of simulated tissues and their residuals."""
-    return request.measure(request.simulated, request.simulator.measure(request.mould), request.threshold)
-
-
-def _posterior(request: Request, surrogate: Surrogate, target: Target) -> dict[str, Any]:
-    """The posterior in numbers."""
-    seen = survey(surrogate, request.mould, request.simulator.seed)
-    return summarise(infer(seen, target, request.simulator.seed, request.error or RATIO_ERROR))
-
-
-def _intervals(
-    request: Request, outline: Outline, measure: Measure, found: Minimum
-) -> dict[str, tuple[float, float]]:
+def _intervals(request: Request, outline: Outline, found: Minimum) -> dict[str, tuple[float, float]]:
     """95 % intervals of a fit to an outline, from its derivatives; none if a combination is left open."""
-    step = {"step": STEP} if request.by_simulator else {}
+    by_simulator = request.by == "simulator"
+    measure, _ = request.simulated() if by_simulator else request.predicted(averaged=True)
+    step = {"step": STEP} if by_simulator else {}
     errors = deviations(measure, found, outline, request.error or OUTLINE_ERROR, **step)
     if not np.isfinite(errors).all():
         return {}

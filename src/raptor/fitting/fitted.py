@@ -6,14 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import Minimum
-from raptor.fitting.outline import Outline
+from raptor.fitting.outline import Outline, distances
+from raptor.fitting.posterior import BOUNDS
 from raptor.fitting.tables import write_fit
-from raptor.fitting.targets import Target
+from raptor.fitting.targets import PARAMETERS, RATIOS, Target
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
+from raptor.surrogate.prediction import Prediction
 
 
 @dataclass(frozen=True)
@@ -26,36 +30,69 @@ class FittedTissue:
     target : Target or Outline
         What was measured.
     by : str
-        "surrogate" or "simulator".
+        "surrogate", "corrected" (by simulations) or "simulator".
     layers : int
+    simulations : int
+        Made for it.
     minimum : Minimum
         The smallest residual sum of squares found.
-    area_ratio, width_ratio : float
-        Of the tissue there.
+    tissue : Tissue or Prediction
+        At the fit, simulated unless the surrogate alone made it.
     intervals : dict of (float, float)
         Ends of the 95 % interval of each parameter; empty if unknown.
-    reachable : bool or None
-        Whether any parameters reproduce the measurement on this mould; None if unknown.
     posterior : mapping
         The posterior in numbers, as from `fitting.summarise`; empty if there is none.
-    density : ndarray (y, x)
-        Of the tissue there, per pixel.
-    threshold : float
-        Density per pixel above which there is tissue.
+    draws : ndarray (n, 3)
+        Parameters drawn from the posterior.
     """
 
     mould: Mould
     target: Target | Outline
     by: str
     layers: int
+    simulations: int
     minimum: Minimum
-    area_ratio: float
-    width_ratio: float
+    tissue: Tissue | Prediction
     intervals: dict[str, tuple[float, float]]
-    reachable: bool | None
     posterior: Mapping[str, Any]
-    density: NDArray[np.floating]
-    threshold: float
+    draws: NDArray[np.float64]
+
+    @property
+    def area_ratio(self) -> float:
+        """A/A0 of the tissue at the fit."""
+        return self.tissue.area_ratio
+
+    @property
+    def width_ratio(self) -> float:
+        """w/w0 of the tissue at the fit."""
+        return self.tissue.width_ratio
+
+    @property
+    def reachable(self) -> bool | None:
+        """Whether any parameters reproduce the measurement on this mould; None if unknown."""
+        return self.posterior.get("reachable")
+
+    @property
+    def open(self) -> list[str]:
+        """Parameters that the measurement leaves open: more than half of what was unknown before is left.
+
+        Compared are the interval, taken for 3.92 standard deviations, and the deviation of a uniform
+        distribution over the parameter's range. All of them where there are no intervals.
+        """
+        return [
+            name
+            for name in PARAMETERS
+            if name not in self.intervals
+            or np.ptp(self.intervals[name]) / 3.92 > 0.5 * (BOUNDS[name].upper - BOUNDS[name].lower) / 12**0.5
+        ]
+
+    def apart(self, tissue: shapely.Geometry) -> float:
+        """Root mean square distance from a measured outline (l0) to that of the tissue at the fit, l0."""
+        fields = self.tissue.to_dataset()
+        found = distances(
+            Outline.along(tissue), fields["density"].to_numpy(), float(fields.attrs["threshold"])
+        )
+        return float(np.sqrt(np.mean(found**2)))
 
     @property
     def parameters(self) -> CellParameters:
@@ -83,12 +120,6 @@ class FittedTissue:
         return self.target if isinstance(self.target, Target) else Target(None, None)
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """Measured and fitted ratios, as `plotting.fit_figure` takes them."""
-        ratios = {"area_ratio": self.area_ratio, "width_ratio": self.width_ratio}
-        return [{"source": "measured", **asdict(self.measured)}, {"source": self.by, **ratios}]
-
-    @property
     def numbers(self) -> dict[str, float | int | bool | str | None]:
         """The fit by name, without nesting."""
         ends = {
@@ -97,6 +128,7 @@ class FittedTissue:
             for end, value in zip(("lower", "upper"), interval, strict=True)
         }
         about = {"mould": self.mould.name, "by": self.by, "layers": self.layers}
+        about |= {"simulations": self.simulations}
         return {**about, **asdict(self.parameters), **self._fitted, **ends, "reachable": self.reachable}
 
     def as_json(self) -> dict[str, Any]:
@@ -106,9 +138,11 @@ class FittedTissue:
             "mould": self.mould.name,
             "by": self.by,
             "layers": self.layers,
+            "simulations": self.simulations,
             "target": asdict(self.measured),
             "fit": {"parameters": asdict(self.parameters), **self._fitted},
             "intervals": ends,
+            "open": self.open,
             "reachable": self.reachable,
         }
         return content | ({"posterior": dict(self.posterior)} if self.posterior else {})
@@ -126,18 +160,55 @@ class FittedTissue:
             "rank": self.rank, "evaluations": self.minimum.evaluations, **apart,
         }  # fmt: skip
 
-    def __str__(self) -> str:
-        parts = []
+    @property
+    def table(self) -> list[tuple[str, str]]:
+        """What was found, and what each number rests on, by name."""
+        rows = []
         for name, value in asdict(self.parameters).items():
-            known = " ({:.2f} to {:.2f})".format(*self.intervals[name]) if name in self.intervals else ""
-            parts.append(f"{name} {value:.3f}{known}")
-        apart = f"rss {self.rss:.1e}" if self.distance is None else f"outlines {self.distance:.2f} l0 apart"
-        said = f"{', '.join(parts)}; A/A0 {self.area_ratio:.3f}, w/w0 {self.width_ratio:.3f}, {apart}"
-        if self.rank < 3:
-            said += (
-                f"\nonly {self.rank} combinations of the three parameters are determined: other parameters "
+            said = f"{value:.3f}"
+            if name in self.intervals:
+                said += ", 95 % {:.2f} to {:.2f}; ".format(*self.intervals[name])
+                said += ("left open by " if name in self.open else "from ") + self._source
+            rows.append((name, said))
+        pairs = zip(("A/A0", "w/w0"), RATIOS, asdict(self.measured).values(), strict=True)
+        for label, name, measured in pairs:
+            given = "" if measured is None else f"{measured:.3f} measured, "
+            rows.append((label, f"{given}{getattr(self, name):.3f} {self._model}"))
+        if self.distance is not None:
+            rows.append(("outlines", f"{self.distance:.2f} l0 apart"))
+        return rows
+
+    @property
+    def warning(self) -> str:
+        """Why the fit is not to be trusted; empty where it may be."""
+        if self.reachable is False:
+            return "no parameters reproduce the measurement on this mould, so do not trust the fit"
+        if self.rank < 3 and not self.intervals:
+            return (
+                f"only {self.rank} combinations of the three parameters are determined: other parameters "
                 "fit equally well"
             )
-        if self.reachable is False:
-            said += "\nno parameters reproduce the measurement on this mould, so do not trust the fit"
-        return said
+        return ""
+
+    @property
+    def _source(self) -> str:
+        """What the parameters rest on."""
+        if isinstance(self.target, Outline):
+            return "the outline"
+        given = [
+            label
+            for label, value in zip(("A/A0", "w/w0"), asdict(self.target).values(), strict=True)
+            if value is not None
+        ]
+        return " and ".join(given)
+
+    @property
+    def _model(self) -> str:
+        """What the ratios at the fit rest on."""
+        if self.by == "surrogate":
+            return "predicted by the surrogate alone"
+        return f"simulated, after {self.simulations} simulations"
+
+    def __str__(self) -> str:
+        said = [f"{name:<10}  {value}" for name, value in self.table]
+        return "\n".join(["", *said, *filter(None, [self.warning])])

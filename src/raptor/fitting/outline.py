@@ -83,7 +83,9 @@ def read_outline(path: Path, page: int | None = None) -> Outline:
     dark = grey <= threshold_otsu(grey)
     level = float(np.median(grey[dark]) + np.median(grey[~dark])) / 2  # half-way, where edges are soft
     excess = level - grey if np.median(rim) > level else grey - level
-    return Outline.along(_pieces(excess[::-1], f"outline {path}"))  # the first row of a picture is on top
+    return Outline.along(
+        tissue_above(excess[::-1], f"outline {path}")
+    )  # the first row of a picture is on top
 
 
 def _drawn(path: Path) -> Outline:
@@ -112,7 +114,7 @@ def outline_of(density: NDArray[np.floating], threshold: float) -> Outline:
     RaptorError
         If the density is nowhere above the threshold.
     """
-    return Outline.along(_pieces(density - threshold, "the density"))
+    return Outline.along(tissue_above(density - threshold, "the density"))
 
 
 def distances(outline: Outline, density: NDArray[np.floating], threshold: float) -> NDArray[np.float64]:
@@ -121,7 +123,7 @@ def distances(outline: Outline, density: NDArray[np.floating], threshold: float)
     NaN if the density is nowhere above the threshold.
     """
     try:
-        tissue = _pieces(density - threshold, "the density")
+        tissue = tissue_above(density - threshold, "the density")
     except RaptorError:
         return np.full(len(outline.points), np.nan)
     edge = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(tissue)])
@@ -179,7 +181,7 @@ def _grey(path: Path, page: int | None) -> NDArray[np.float64]:
     return np.asarray(colours.mean(axis=2))
 
 
-def _pieces(excess: NDArray[np.floating], what: str) -> shapely.Geometry:
+def tissue_above(excess: NDArray[np.floating], what: str) -> shapely.Geometry:
     """The region where a field (y, x) on the image's raster is positive, without specks, l0."""
     size = pixel_size(excess.shape[-1])
     padded = np.pad(excess, 1, constant_values=min(float(excess.min()), -1e-6))

@@ -14,7 +14,8 @@ i the interpolation error. The prior is the paper's distribution: delta uniform,
 their bounded plane.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +39,10 @@ POINTS = 128  # Sobol points at which the surrogate is evaluated
 RATIO_ERROR = 0.01  # standard error of a measured area or width ratio
 DENSE = 2**16  # points of the posterior
 BANDED = 32  # points of a survey at which bands are computed
-TOGETHER = 32  # predictions per batch
+TOGETHER = 16  # predictions per batch
 QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 BINS = 40  # of a profile
+BEST = 0.1  # chi2 above its minimum: a third of a standard deviation
 UNLIKELY = 0.01  # probability of a larger chi2 below which the measurement is out of reach
 BOUNDS = dict(zip(PARAMETERS, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True))
 
@@ -63,6 +65,12 @@ class Survey:
     values: NDArray[np.float64]
     sigma: NDArray[np.float64]
     names: tuple[str, ...] = SEEN
+
+    def shifted(self, shift: NDArray[np.float64]) -> "Survey":
+        """With a constant (2,) added to A/A0 and w/w0; NaN counts as zero."""
+        values = self.values.copy()
+        values[:, :2] += np.nan_to_num(shift)
+        return replace(self, values=values)
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,12 @@ class Posterior:
         """Effective number of equally weighted points."""
         return float(1 / (self.weights**2).sum())
 
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """The point (3,) of the cube nearest to the posterior's mean among those that fit best."""
+        best = self.units[self.chi2 < self.chi2.min() + BEST]
+        return np.asarray(best[np.linalg.norm(best - self.weights @ self.units, axis=1).argmin()])
+
     def draws(self, count: int, seed: int) -> NDArray[np.intp]:
         """Indices (count,) of points drawn by weight, evenly along the posterior's longest axis."""
         along = self.units @ _longest(self)
@@ -108,7 +122,13 @@ class Posterior:
         return np.asarray(order[np.minimum(found, len(order) - 1)])
 
 
-def survey(surrogate: "Surrogate", mould: Mould, seed: int, points: int = POINTS) -> Survey:
+def survey(
+    surrogate: "Surrogate",
+    mould: Mould,
+    seed: int,
+    points: int = POINTS,
+    on_progress: Callable[[str], None] = lambda note: None,
+) -> Survey:
     """Evaluate the surrogate for a mould at points (a power of two) that fill the region.
 
     Predictions are means over the images of D4, like those on which bands were calibrated; bands are computed
@@ -123,12 +143,16 @@ def survey(surrogate: "Surrogate", mould: Mould, seed: int, points: int = POINTS
     parameters = [parameters_at(unit) for unit in units]
     cast = surrogate.cast(mould)
     level = LEVELS.index(0.95)
-    bands = [surrogate.examine(cast, p).ratio_bands.half[level] for p in parameters[:BANDED]]
-    values = []
-    for start in range(0, points, TOGETHER):
-        part = parameters[start : start + TOGETHER]
-        fields = surrogate.predict(cast, part)
+    bands, values = [], []
+    for point in parameters[:BANDED]:
+        examined = surrogate.examine(cast, point)
+        bands.append(examined.ratio_bands.half[level])
+        values.append(seen(examined.values, cast, surrogate.threshold))
+        on_progress(f"{len(values)} of {points} predictions over the region")
+    for start in range(BANDED, points, TOGETHER):
+        fields = surrogate.predict(cast, parameters[start : start + TOGETHER])
         values += [seen(each, cast, surrogate.threshold) for each in fields]
+        on_progress(f"{len(values)} of {points} predictions over the region")
     found = np.array(values)
     found[np.isnan(found) & ~np.isnan(found).all(axis=0)] = 0.0  # a tissue torn at a section has no width
     return Survey(units, found, np.array(bands, dtype=float) / norm.ppf(0.975))

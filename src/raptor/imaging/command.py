@@ -7,7 +7,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from raptor import imaging
-from raptor.imaging.report import MeasuredPhotograph
+from raptor.core.errors import RaptorError
+from raptor.imaging.report import MeasuredPhotograph, MeasurementError
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 
@@ -53,13 +54,21 @@ def measure(
     Raises
     ------
     RaptorError
-        If the photograph or the mould cannot be read, or the tissue cannot be found.
+        If the photograph or the mould cannot be read.
+    MeasurementError
+        If the mould or the tissue cannot be found in it; `raptor.plot` draws the error.
     """
     appearance, mould = imaging.appearance_named(look), as_mould(mould)
     if isinstance(photograph, (str, Path)):
         picture = imaging.read_picture(Path(photograph), page, channel)
     else:
         picture = imaging.as_picture(photograph, "the photograph")
-    registration = imaging.register(picture, mould, landmarks, aligned, mirrored)
-    found = imaging.measure(picture, mould, registration, appearance, threshold)
+    registration = None
+    try:
+        registration = imaging.register(picture, mould, landmarks, aligned, mirrored)
+        found = imaging.measure(picture, mould, registration, appearance, threshold)
+    except RaptorError as error:
+        raise MeasurementError(
+            str(error), picture, mould, registration or getattr(error, "registration", None)
+        ) from error
     return MeasuredPhotograph(picture, mould, found)

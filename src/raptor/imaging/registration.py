@@ -23,6 +23,14 @@ NUMBER = r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*"
 LANDMARK = re.compile(rf"{NUMBER},{NUMBER}=(?:{NUMBER},{NUMBER}|\s*tether\s*(\d+)\s*)")
 
 
+class RegistrationError(RaptorError):
+    """The mould was found in the picture, but not well enough; `registration` is where."""
+
+    def __init__(self, sentence: str, registration: "Registration") -> None:
+        super().__init__(sentence)
+        self.registration = registration
+
+
 @dataclass(frozen=True)
 class Registration:
     """A similarity from the mould to the picture.
@@ -111,9 +119,10 @@ def from_landmarks(
     residual = float(np.sqrt(np.mean(np.sum(misses**2, axis=1)))) if len(points) > 2 else float("nan")
     if residual > MAX_LANDMARK_RESIDUAL:
         worst = int(np.argmax(np.linalg.norm(misses, axis=1))) + 1
-        raise RaptorError(
+        raise RegistrationError(
             f"the landmarks do not fit the mould: residual {residual:.2f} l0, above "
-            f"{MAX_LANDMARK_RESIDUAL}; check landmark {worst} first, then --mirrored"
+            f"{MAX_LANDMARK_RESIDUAL}; check landmark {worst} first, then --mirrored",
+            found,
         )
     return Registration(matrix, "landmarks", residual)
 

@@ -8,10 +8,28 @@ from typing import Any
 
 import shapely
 
+from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path
 from raptor.imaging.pictures import Picture
+from raptor.imaging.registration import Registration
 from raptor.imaging.tissue import Measurement
 from raptor.moulds import Mould
+
+
+class MeasurementError(RaptorError):
+    """The tissue or its mould could not be found in a photograph; with how far the measurement came.
+
+    Parameters
+    ----------
+    registration : Registration or None
+        Where the mould was found, well or badly; None if nowhere.
+    """
+
+    def __init__(
+        self, sentence: str, picture: Picture, mould: Mould, registration: Registration | None
+    ) -> None:
+        super().__init__(sentence)
+        self.picture, self.mould, self.registration = picture, mould, registration
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from skimage.segmentation import watershed
 
 from raptor.core.errors import RaptorError
 from raptor.imaging.illumination import find_plate, log_brightness
-from raptor.imaging.registration import Registration
+from raptor.imaging.registration import Registration, RegistrationError
 from raptor.moulds import Mould
 
 SMOOTHING = 1.5  # pixels
@@ -84,19 +84,21 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     for reach in CLOSE:
         found = _fit(found, edges, _edge_offsets(even, edges, found, reach, least))
     if found.scale < MIN_SCALE:
-        raise RaptorError(
+        raise RegistrationError(
             f"the mould is too small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} "
-            "are needed; photograph it from closer, crop the image around it, or give --landmark"
+            "are needed; photograph it from closer, crop the image around it, or give --landmark",
+            found,
         )
-    _require_overlap(_overlap(found, mould, polygon), MIN_OVERLAP[1], mould)
+    _require_overlap(found, MIN_OVERLAP[1], mould, polygon)
     offsets = _edge_offsets(even, rim, found, CLOSE[-1], least)
     near = np.abs(offsets) < NEAR
     residual = float(np.sqrt(np.mean(offsets[near] ** 2))) if near.any() else np.inf
     if near.mean() < MIN_SEEN or residual > MAX_RESIDUAL:
-        raise RaptorError(
+        raise RegistrationError(
             f"{mould.name} cannot be registered: {100 * near.mean():.0f} % of its rim is visible (at least "
             f"{100 * MIN_SEEN:.0f} % is needed) with a residual of {residual:.2f} l0 (at most {MAX_RESIDUAL} "
-            f"is allowed); {ADVICE}"
+            f"is allowed); {ADVICE}",
+            found,
         )
     _require_one_edge(even, rim, found, mould)
     return Registration(found.matrix, "rim", residual)
@@ -153,7 +155,7 @@ def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registratio
     scale = np.sqrt(region.area / mould.outline.area)
     flip = np.diag([1.0, 1.0 if mirrored else -1.0])
     centre, middle = (shapely.get_coordinates(shape.centroid)[0] for shape in (region, mould.outline))
-    best, found = 0.0, None
+    best, found = -1.0, None
     angles = np.arange(-ANGLES // 2, ANGLES // 2) * 2 * np.pi / ANGLES
     for angle in sorted(angles, key=abs):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -164,8 +166,8 @@ def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registratio
         overlap = _overlap(candidate, mould, region)
         if overlap > best + 1e-3:  # of a symmetric mould, the least turn
             best, found = overlap, candidate
-    _require_overlap(best, MIN_OVERLAP[0], mould)
     assert found is not None
+    _require_overlap(found, MIN_OVERLAP[0], mould, region)
     return found
 
 
@@ -176,11 +178,13 @@ def _overlap(registration: Registration, mould: Mould, region: shapely.Polygon) 
     return float(common / (shape.area + region.area - common))
 
 
-def _require_overlap(overlap: float, least: float, mould: Mould) -> None:
+def _require_overlap(found: Registration, least: float, mould: Mould, region: shapely.Polygon) -> None:
+    overlap = _overlap(found, mould, region)
     if overlap < least:
-        raise RaptorError(
+        raise RegistrationError(
             f"the region in the image does not have the shape of {mould.name}: they overlap by "
-            f"{100 * overlap:.0f} %, at least {100 * least:.0f} % is needed; {ADVICE}"
+            f"{100 * overlap:.0f} %, at least {100 * least:.0f} % is needed; {ADVICE}",
+            found,
         )
 
 
@@ -208,9 +212,10 @@ def _require_one_edge(
     peaks, _ = find_peaks(common, height=SECOND_EDGE * common.max())
     second = along[[peak for peak in peaks if apart[peak]]]
     if len(second):
-        raise RaptorError(
+        raise RegistrationError(
             f"the rim of {mould.name} shows a second edge, {abs(second[0]):.1f} l0 from the first: its wall "
-            "is visible as a band, or the tissue follows it closely; give --landmark at posts or corners"
+            "is visible as a band, or the tissue follows it closely; give --landmark at posts or corners",
+            registration,
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
@@ -50,6 +51,7 @@ METADATA: dict[str, dict[str, None]] = {
 }
 """Suffixes of pictures, and metadata omitted so that the same data give the same bytes."""
 HALF = IMAGE_SIZE / 2
+HALO = [withStroke(linewidth=1.5, foreground="#b5402f")]  # a number is read beside a thin tether too
 
 
 class NotebookFigure(Figure):
@@ -154,7 +156,7 @@ def fields_figure(stacks: Mapping[str, NDArray[np.floating]], mould: Mould) -> F
 
 @STYLED
 def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = None) -> Figure:
-    """A mould as the model sees it, with the cells of its lowest layer.
+    """A mould as the model sees it, with the cells of its lowest layer and the numbers of its tethers.
 
     Parameters
     ----------
@@ -166,6 +168,10 @@ def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = Non
     figure = new_figure(5.2, 5.8)
     axes = figure.add_subplot()
     draw_mould(axes, mould)
+    for number, tether in enumerate(mould.tethers, start=1):
+        middle = tether.polygon.representative_point()
+        style: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "fontsize": 7}
+        axes.text(middle.x, middle.y, str(number), weight="bold", path_effects=HALO, **style)
     sites = cast_sites(mould, 1)
     axes.plot(sites[:, 0], sites[:, 1], ".", ms=1.5, color=SIMULATED, rasterized=True)
     if like is not None:

@@ -13,7 +13,7 @@ from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import read_mould
 from raptor.moulds.summary import summarise
 from raptor.plotting.drawing import fields_figure, mould_figure
-from raptor.plotting.fits import PARAMETER_LABELS, fit_figure
+from raptor.plotting.fits import PARAMETER_LABELS
 from raptor.plotting.tissue import tissue_figure
 from raptor.symmetry import FIELDS
 
@@ -23,15 +23,18 @@ if TYPE_CHECKING:
 NUMBERS = PARAMETER_LABELS | {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
 
 
-def plot(what: Any, *, fields: bool = False) -> Figure:
+def plot(what: Any, *, fields: bool = False, photograph: Any = None) -> Figure:
     """Draw a mould, a simulated or a predicted tissue, its fields, a fit, or a measured photograph.
 
     Parameters
     ----------
     what : Mould, Tissue, Prediction, Dataset of fields, FittedTissue, MeasuredPhotograph, str or Path
-        A string or a path is a mould (a library name or a file), or a netCDF file of a tissue.
+        A string or a path is a mould (a library name or a file), or a netCDF file of a tissue. The error
+        `MeasurementError` of a photograph is drawn too.
     fields : bool
         Draw the eight fields of a tissue, instead of density, directors, tethers and numbers.
+    photograph : MeasuredPhotograph, optional
+        Of a fit: what it was measured in, drawn with the tissue at the fit over it.
 
     Returns
     -------
@@ -47,11 +50,16 @@ def plot(what: Any, *, fields: bool = False) -> Figure:
         what = load_fields(what) if Path(what).suffix == ".nc" else read_mould(what)
     if isinstance(what, Mould):
         return mould_figure(what, summarise(what).rows)
-    if hasattr(what, "density") and hasattr(what, "by"):
-        return fit_figure(what.mould, {what.by: what.density}, {what.by: what.threshold}, what.rows)
-    if hasattr(what, "picture"):
-        from raptor.plotting.overlay import overlay_figure
+    if hasattr(what, "minimum"):
+        from raptor.plotting.fitted import fitted_figure
 
+        return fitted_figure(what, photograph)
+    if hasattr(what, "picture"):  # imaging is not loaded for other pictures
+        from raptor.imaging.report import MeasurementError
+        from raptor.plotting.overlay import overlay_figure, refused_figure
+
+        if isinstance(what, MeasurementError):
+            return refused_figure(what)
         return overlay_figure(what.picture, what.mould, what.measurement)
     if hasattr(what, "to_dataset"):
         what = what.to_dataset()

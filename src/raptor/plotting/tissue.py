@@ -1,5 +1,6 @@
 """One tissue for people: density and directors in its mould, tethers held and lost, and its numbers."""
 
+from collections.abc import Mapping
 from math import floor, log10
 from typing import TYPE_CHECKING, Any
 
@@ -33,36 +34,57 @@ def tissue_figure(fields: "xr.Dataset") -> Figure:
         As `raptor.fields.labelled` makes it, of a simulation or a prediction.
     """
     mould = mould_of(fields)
-    x0, y0, x1, y1 = mould.outline.bounds
     rows = _rows(fields)
     width = 5.2
-    height = width * 0.8 * (y1 - y0 + 3 * RIM) / (x1 - x0 + 2 * RIM)
+    height = width * 0.8 * height_of(mould)
     figure = new_figure(width, height + 0.55 + 0.19 * len(rows))
     top, bottom = figure.subplots(2, 1, height_ratios=[height, 0.19 * len(rows)])
+    tension = draw_tissue(figure, top, fields, mould)
+    rows["tension"] = rf"at most {tension:.2g} $\kappa_0 l_0$ a cell, at the triangle"
+    write_rows(bottom, rows)
+    return figure
+
+
+def height_of(mould: Mould) -> float:
+    """Height over width of the part of the frame that is drawn."""
+    x0, y0, x1, y1 = mould.outline.bounds
+    return float((y1 - y0 + 3 * RIM) / (x1 - x0 + 2 * RIM))
+
+
+def draw_tissue(figure: Figure, axes: Axes, fields: "xr.Dataset", mould: Mould) -> float:
+    """Density, directors and tethers of a tissue, with a scale bar; returns the highest tension of a cell."""
+    x0, y0, x1, y1 = mould.outline.bounds
     stack = np.stack([fields[name].to_numpy() for name in FIELDS])
     threshold = float(fields.attrs["threshold"])
     as_cast = float(fields.attrs["n_cells"]) / float(fields["depression"].sum())
-    shown = top.imshow(
+    shown = axes.imshow(
         np.ma.masked_less(stack[0], threshold) / as_cast,
         origin="lower", extent=(-HALF, HALF, -HALF, HALF), cmap=SEQUENTIAL, vmin=0.0,
     )  # fmt: skip
-    draw_directors(top, directors(stack, threshold))
+    draw_directors(axes, directors(stack, threshold))
     x, y, tension = _highest_tension(stack, fields, threshold)
-    rows["tension"] = rf"at most {tension:.2g} $\kappa_0 l_0$ a cell, at the triangle"
-    top.plot(x, y, "^", color="white", mec="black", ms=6)
-    _draw_walls(top, mould, _lost(fields))
-    _draw_scale(top, mould)
-    top.set(xlim=(x0 - RIM, x1 + RIM), ylim=(y0 - 2 * RIM, y1 + RIM), aspect="equal")
-    top.axis("off")
-    top.set_title(_title(fields, mould), loc="left")
-    figure.colorbar(shown, ax=top, shrink=0.7, label="density, over that as cast")
-    bottom.axis("off")
+    axes.plot(x, y, "^", color="white", mec="black", ms=6)
+    _draw_walls(axes, mould, _lost(fields))
+    _draw_scale(axes, mould)
+    axes.set(xlim=(x0 - RIM, x1 + RIM), ylim=(y0 - 2 * RIM, y1 + RIM), aspect="equal")
+    axes.axis("off")
+    axes.set_title(_title(fields, mould), loc="left")
+    figure.colorbar(shown, ax=axes, shrink=0.7, label="density, over that as cast")
+    return tension
+
+
+def write_rows(axes: Axes, rows: Mapping[str, str]) -> None:
+    """A table of names and values; in red what warns."""
+    axes.axis("off")
     for number, (name, value) in enumerate(rows.items()):
-        place = {"y": 1 - (number + 0.5) / len(rows), "transform": bottom.transAxes, "va": "center"}
-        colour = WARNING if name == "unusual" else "black"
-        bottom.text(0.0, s=name, color=colour, **place)
-        bottom.text(0.2, s=value, color=colour, **place)
-    return figure
+        place: dict[str, Any] = {
+            "y": 1 - (number + 0.5) / len(rows),
+            "transform": axes.transAxes,
+            "va": "center",
+        }
+        colour = WARNING if name in ("unusual", "warning") else "black"
+        axes.text(0.0, s=name, color=colour, **place)
+        axes.text(0.2, s=value, color=colour, **place)
 
 
 def _title(fields: "xr.Dataset", mould: Mould) -> str:

@@ -97,7 +97,7 @@ def test_a_corrected_survey_moves_the_posterior_to_where_the_simulator_has_it():
     right = infer(found.shifted(wrong).shifted(-wrong), target, 0, dense=2**12)
     assert right.weights == pytest.approx(infer(found, target, 0, dense=2**12).weights)
     assert abs(biased.weights - right.weights).max() > 1e-4
-    assert smooth([parameters_at(right.middle)])[0] == pytest.approx(smooth([TRUTH])[0], abs=0.005)
+    assert smooth([parameters_at(right.middle)])[0] == pytest.approx(smooth([TRUTH])[0], abs=0.01)
 
 
 def test_the_surrogates_error_widens_intervals():

@@ -93,7 +93,7 @@ def _draw_histogram(axes: Axes, measurement: Measurement) -> None:
     axes.set(
         xlabel="brightness relative to the plate, corrected", ylabel="pixels of the depression", yticks=[]
     )
-    axes.legend(frameon=False, fontsize=7)
+    axes.legend(frameon=False, fontsize=7, loc="upper right")  # the best place takes long to find
 
 
 def _draw(

@@ -1,44 +1,52 @@
 """One line a job in the log of a workflow, and errors in full: the logger `raptor` of the default profile.
 
-`snakemake --logger` finds a module by this name. A dry run is printed as Snakemake prints it.
+`snakemake --logger` finds a module by this name. A dry run, and a run with `--verbose`, is printed as
+Snakemake prints it.
 """
 
 import sys
 from datetime import datetime
 from logging import LogRecord
+from typing import Any
 
-from snakemake.logging import ColorizingTextHandler, DefaultFilter, DefaultFormatter, format_wildcards
+from snakemake.logging import (  # type: ignore[import-untyped]
+    ColorizingTextHandler,
+    DefaultFilter,
+    DefaultFormatter,
+    format_wildcards,
+)
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-SILENT = (LogEvent.WORKFLOW_STARTED, LogEvent.JOB_INFO, LogEvent.RESOURCES_INFO, LogEvent.PROGRESS)
-CHATTER = ("Building DAG", "Select jobs", "Execute ", "Assuming unrestricted", "Using shell", "host:")
+SILENT = (LogEvent.WORKFLOW_STARTED, LogEvent.JOB_STARTED, LogEvent.RESOURCES_INFO)
+CHATTER = ("Building DAG", "Select jobs", "Assuming unrestricted", "Using ", "host:")
 """First words of messages about what Snakemake does itself."""
 
 
-class BriefFormatter(DefaultFormatter):
+class BriefFormatter(DefaultFormatter):  # type: ignore[misc]
     """A line when a job ends; Snakemake's own words for errors and for the rest."""
 
-    jobs: dict[int, str]
-    done = total = 0
+    def __init__(self, *settings: Any) -> None:
+        super().__init__(*settings)
+        self.jobs: dict[int, str] = {}
+        self.finished: list[str] = []
 
     def format(self, record: LogRecord) -> str:
         """The text of a record; empty for one that is left out."""
-        event = getattr(record, "event", None)
-        self.jobs = getattr(self, "jobs", {})
+        event, about = getattr(record, "event", None), record.__dict__
         if event is LogEvent.JOB_INFO:
-            wildcards = format_wildcards(record.wildcards)
-            self.jobs[record.jobid] = f"{record.rule_name} {wildcards}".rstrip()
-        if event is LogEvent.RUN_INFO:
-            self.total = sum(record.per_rule_job_counts.values())
-            return f"{self.total} jobs to do"
+            wildcards = format_wildcards(about["wildcards"])
+            self.jobs[about["jobid"]] = f"{about['rule_name']} {wildcards}".rstrip()
+            return ""
         if event is LogEvent.JOB_FINISHED:
-            self.done += 1
-            job = self.jobs.pop(record.job_id, "job")
-            return f"[{datetime.now():%H:%M:%S}] {self.done} of {self.total or '?'}: {job}"
+            self.finished.append(self.jobs.pop(about["job_id"], "a group"))
+            return ""
+        if event is LogEvent.PROGRESS:
+            jobs, self.finished = "; ".join(self.finished), []
+            return f"[{datetime.now():%H:%M:%S}] {about['done']} of {about['total']}: {jobs}"
         if event in SILENT or (event is None and str(record.msg or "").startswith(CHATTER)):
             return ""
-        return super().format(record)
+        return str(super().format(record))
 
 
 class LogHandler(LogHandlerBase):
@@ -47,7 +55,7 @@ class LogHandler(LogHandlerBase):
     def __post_init__(self) -> None:
         """Take the settings of the command line."""
         common = self.common_settings
-        formatter = DefaultFormatter if common.dryrun else BriefFormatter
+        formatter = DefaultFormatter if common.dryrun or common.verbose else BriefFormatter
         self.inner = ColorizingTextHandler(
             nocolor=common.nocolor,
             stream=sys.stdout if common.stdout else sys.stderr,
@@ -59,7 +67,11 @@ class LogHandler(LogHandlerBase):
 
     def emit(self, record: LogRecord) -> None:
         """Write a record."""
-        if self.inner.filter(record):
+        if not self.inner.filter(record):
+            return
+        if getattr(record, "event", None) is LogEvent.JOB_INFO and not self.common_settings.dryrun:
+            self.inner.format(record)  # noted; `emit` would write an empty line
+        else:
             self.inner.emit(record)
 
     writes_to_stream = True

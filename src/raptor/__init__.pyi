@@ -10,6 +10,8 @@ from .imaging.report import MeasuredPhotograph, MeasurementError
 from .moulds.geometry import Circle, Mould
 from .moulds.library.tissues import MeasuredTissue, tissue
 from .moulds.reading import read_mould
+from .optimisation.command import design
+from .optimisation.designs import Designs
 from .parameters import CellParameters, NetworkModel
 from .plotting.front import plot
 from .studies.curve import sweep
@@ -21,6 +23,7 @@ __all__ = [
     "MODEL_VERSION",
     "CellParameters",
     "Circle",
+    "Designs",
     "FittedTissue",
     "MeasuredPhotograph",
     "MeasuredTissue",
@@ -32,6 +35,7 @@ __all__ = [
     "Surrogate",
     "Tissue",
     "__version__",
+    "design",
     "fit",
     "load_fields",
     "load_surrogate",

@@ -47,6 +47,7 @@ wildcard_constraints:
     member=r"\d+",
     tissue="|".join(TISSUES) or "none",
     case="|".join(CASES) or "none",
+    search="|".join(CONFIG.searches) or "none",
 
 
 onstart:

@@ -215,6 +215,7 @@ rule studies:
     input:
         expand(rules.tabulate_campaign.output, campaign=SWEEPS),
         expand(rules.compare_contraction.output, campaign=SWEEPS),
+        expand(rules.search_moulds.output, search=CONFIG.searches),
         [
             f"{RESULTS}/figures/{figure}.png"
             for figure in (*TABLE_FIGURES, *FIELD_FIGURES)

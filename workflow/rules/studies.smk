@@ -88,3 +88,35 @@ rule tabulate_tradeoff:
         mem_mb=500,
     script:
         "../scripts/tabulate_tradeoff.py"
+
+
+rule search_moulds:
+    """Search for moulds whose tissues do what a specification asks for, and simulate the best."""
+    input:
+        spec=lambda wildcards: CONFIG.searches[wildcards.search],
+        weights=SURROGATE["weights"],
+        kernels=ancient(rules.compile_kernels.output.kernels),
+    output:
+        table=report(
+            f"{RESULTS}/searches/{{search}}/designs.csv",
+            category="Studies",
+            labels={"campaign": "{search}", "what": "designs"},
+        ),
+        front=f"{RESULTS}/searches/{{search}}/front.csv",
+        moulds=f"{RESULTS}/searches/{{search}}/designs.geojson",
+        figure=report(
+            f"{RESULTS}/searches/{{search}}/front.png",
+            category="Studies",
+            labels={"campaign": "{search}", "what": "front"},
+        ),
+    log:
+        f"{RESULTS}/logs/search_moulds/{{search}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/search_moulds/{{search}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2500,
+    params:
+        model_version=MODEL_VERSION,
+    script:
+        "../scripts/search_moulds.py"

@@ -9,6 +9,7 @@ from typing import Any
 import typer
 
 from raptor.cli.data import check, fetch, progress, reference, same, trace, well
+from raptor.cli.design import design
 from raptor.cli.draw import draw
 from raptor.cli.fit import fit
 from raptor.cli.library import moulds, tissues
@@ -29,8 +30,8 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, simulate, predict, plot, sweep, fit, measure, check, trace, same, progress, well,
-    fetch, reference,
+    moulds, tissues, draw, simulate, predict, plot, sweep, fit, design, measure, check, trace, same, progress,
+    well, fetch, reference,
 )  # fmt: skip
 
 

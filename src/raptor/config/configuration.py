@@ -75,6 +75,10 @@ class Configuration(Block):
     )
     fit: Fit = Field(default_factory=lambda: Fit())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
+    searches: dict[Name, str] = Field(
+        default_factory=dict,
+        description="searches for moulds by the surrogate, by name: files as in docs/design.md",
+    )
 
     @field_validator("models", mode="before")
     @classmethod
@@ -98,6 +102,8 @@ class Configuration(Block):
             self._check_campaign(name, campaign)
         for name, model in self.models.items():
             self._check_model(name, model)
+        if self.searches and not self.models:
+            raise ValueError("searches need a surrogate; give models, or no searches")
         self._order()
         for pixels in self.tradeoff.rasters:
             if max(pixels, self.pixels) % min(pixels, self.pixels):

@@ -13,6 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.moulds.cast import cast_sites, central_section
 from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
 from raptor.moulds.reading import read_at_scale, read_mould
+from raptor.optimisation.spec import others, read_spec
 
 
 def parse(content: Any, where: str, folders: Sequence[Path] = ()) -> Configuration:
@@ -53,7 +54,10 @@ def _with_paths(configuration: Configuration, folders: Sequence[Path]) -> Config
     if fit.tissues_file is not None:
         fit = fit.model_copy(update={"tissues_file": _found(fit.tissues_file, folders)})
     tradeoff = configuration.tradeoff.model_copy(update={"cases": cases})
-    return configuration.model_copy(update={"campaigns": campaigns, "tradeoff": tradeoff, "fit": fit})
+    searches = {name: _found(path, folders) for name, path in configuration.searches.items()}
+    return configuration.model_copy(
+        update={"campaigns": campaigns, "tradeoff": tradeoff, "fit": fit, "searches": searches}
+    )
 
 
 def _found(name: str, folders: Sequence[Path]) -> str:
@@ -80,6 +84,11 @@ def checked(
     """
     configuration = parse(content, where, folders)
     require_castable(configuration)
+    for name, path in configuration.searches.items():
+        try:
+            others(read_spec(path).compare)
+        except RaptorError as error:
+            raise RaptorError(f"searches.{name}: {error}") from error
     fit = configuration.fit
     tissues = load_tissues(fit.tissues_file, fit.tissues if configuration.models else ())
     require_measurable(tissues, configuration.mould_scale)

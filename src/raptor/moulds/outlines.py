@@ -33,10 +33,10 @@ def _mirrored(quarter: NDArray[np.float64]) -> shapely.Polygon:
     return shapely.Polygon(np.concatenate([half, (half * (1, -1))[::-1]])).buffer(0)
 
 
-def _rounded(polygon: shapely.Polygon, radius: float) -> shapely.Polygon:
-    """The polygon with its outer and inner corners rounded to a radius."""
-    opened = polygon.buffer(-radius, join_style="mitre").buffer(radius, quad_segs=ARC)
-    return opened.buffer(radius, join_style="mitre").buffer(-radius, quad_segs=ARC)
+def rounded(polygon: shapely.Polygon, radius: float, segments: int = ARC) -> shapely.Polygon:
+    """The polygon with its outer and inner corners rounded to a radius, in segments a quarter circle."""
+    opened = polygon.buffer(-radius, join_style="mitre").buffer(radius, quad_segs=segments)
+    return opened.buffer(radius, join_style="mitre").buffer(-radius, quad_segs=segments)
 
 
 def rectangle(rng: Generator) -> shapely.Polygon:
@@ -46,7 +46,7 @@ def rectangle(rng: Generator) -> shapely.Polygon:
 
 def rounded_rectangle(rng: Generator) -> shapely.Polygon:
     """A rectangle with corners rounded by 5 to 35 % of its width."""
-    return _rounded(rectangle(rng), rng.uniform(0.05, 0.35))
+    return rounded(rectangle(rng), rng.uniform(0.05, 0.35))
 
 
 def pill(rng: Generator) -> shapely.Polygon:
@@ -85,7 +85,7 @@ def star(rng: Generator) -> shapely.Polygon:
     points, inner = int(rng.integers(3, 9)), rng.uniform(0.45, 0.8)
     angles = np.pi * np.arange(2 * points) / points
     radii = np.where(np.arange(2 * points) % 2 == 0, 1.0, inner)
-    return _rounded(shapely.Polygon(np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])), 0.06)
+    return rounded(shapely.Polygon(np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])), 0.06)
 
 
 def cross(rng: Generator) -> shapely.Polygon:
@@ -120,7 +120,7 @@ def dog_bone(rng: Generator) -> shapely.Polygon:
     head, flare = half * rng.uniform(0.2, 0.45), half * rng.uniform(0.05, 0.3)
     corners = [(half, 0), (half, end), (half - head, end), (half - head - flare, waist), (0, waist)]
     outline = _mirrored(np.array(corners))
-    return _rounded(outline, 0.4 * waist) if rng.random() < 0.5 else outline
+    return rounded(outline, 0.4 * waist) if rng.random() < 0.5 else outline
 
 
 def i_shape(rng: Generator) -> shapely.Polygon:
@@ -138,7 +138,7 @@ def broad_strip(rng: Generator) -> shapely.Polygon:
     middle, flare = half * rng.uniform(0.15, 0.5), half * rng.uniform(0.1, 0.45)
     corners = [(half, 0), (half, end), (min(middle + flare, 0.95 * half), end), (middle, 0.5), (0, 0.5)]
     outline = _mirrored(np.array(corners))
-    return _rounded(outline, 0.15) if rng.random() < 0.5 else outline
+    return rounded(outline, 0.15) if rng.random() < 0.5 else outline
 
 
 def notched_strip(rng: Generator) -> shapely.Polygon:

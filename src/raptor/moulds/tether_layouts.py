@@ -1,7 +1,8 @@
 """Layouts of tethers as people place them: posts, bars, blocks and holes, one function per layout.
 
-Each takes a generator, the outline and the radius of its largest inscribed circle (l0) and proposes
-tethers; the caller keeps those that fit in the outline with gaps between them (`families`).
+Each takes a generator and the outline and proposes tethers; the caller keeps those that fit in the outline
+with gaps between them (`families`). What a layout draws and where that puts its tethers are two functions
+where a search (`raptor.optimisation`) needs the second alone.
 """
 
 from collections.abc import Callable
@@ -64,15 +65,18 @@ def ends(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
     length, width = _extent(outline)
     count, radius = int(rng.integers(1, 6)), _post_radius(rng, min(length, width))
     inset = radius + rng.uniform(WALL, 0.2 * length)
-    posts: list[Tether] = []
-    for x in (inset - length / 2, length / 2 - inset):
-        span = _across(outline, x)
-        if span is None:
-            continue
-        low, high = span[0] + radius + WALL, span[1] - radius - WALL
-        places = [(low + high) / 2] if count == 1 else np.linspace(low, high, count)
-        posts += [Circle(float(x), float(y), radius) for y in places]
-    return posts
+    ends = (inset - length / 2, length / 2 - inset)
+    return [post for x in ends for post in posts_across(outline, x, count, radius, WALL)]
+
+
+def posts_across(outline: shapely.Polygon, x: float, count: int, radius: float, wall: float) -> list[Tether]:
+    """Posts evenly across the outline at x, the outer ones at a distance from the wall."""
+    span = _across(outline, x)
+    if span is None:
+        return []
+    low, high = span[0] + radius + wall, span[1] - radius - wall
+    places = [(low + high) / 2] if count == 1 else np.linspace(low, high, count)
+    return [Circle(float(x), float(y), radius) for y in places]
 
 
 def rim(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
@@ -82,7 +86,11 @@ def rim(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
     if inner.is_empty or inner.geom_type != "Polygon":
         return []
     count, start = int(rng.integers(4, 17)), rng.random()
-    line = inner.exterior
+    return posts_along(inner.exterior, count, start, radius)
+
+
+def posts_along(line: shapely.LinearRing, count: int, start: float, radius: float) -> list[Tether]:
+    """Posts at equal distances along a closed line, the first at a share of its length."""
     places = [line.interpolate((start + k / count) % 1, normalized=True) for k in range(count)]
     return [Circle(point.x, point.y, radius) for point in places]
 
@@ -134,14 +142,17 @@ def end_bars(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
     length, _ = _extent(outline)
     thick, share = _bar_thickness(rng, length), rng.uniform(0.4, 0.97)
     inset = thick / 2 + (0.0 if rng.random() < 0.1 else rng.uniform(WALL, 0.15 * length))
-    bars: list[Tether] = []
-    for x in (inset - length / 2, length / 2 - inset):
-        span = _across(outline, x)
-        if span is None:
-            continue
-        middle, half = (span[0] + span[1]) / 2, share * (span[1] - span[0]) / 2
-        bars.append(_bar(x, middle, thick, 2 * half))
-    return bars
+    ends = (inset - length / 2, length / 2 - inset)
+    return [each for x in ends for each in bar_across(outline, x, thick, share)]
+
+
+def bar_across(outline: shapely.Polygon, x: float, thick: float, share: float) -> list[Tether]:
+    """A bar across the outline at x, as long as a share of its width there; none outside."""
+    span = _across(outline, x)
+    if span is None:
+        return []
+    middle, half = (span[0] + span[1]) / 2, share * (span[1] - span[0]) / 2
+    return [bar(x, middle, thick, 2 * half)]
 
 
 def side_bars(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
@@ -149,7 +160,7 @@ def side_bars(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
     length, width = _extent(outline)
     thick, reach = _bar_thickness(rng, width), length * rng.uniform(0.2, 0.9)
     y = width / 2 - thick / 2 - rng.uniform(WALL, 0.15 * width + WALL)
-    return [_bar(0.0, s * y, reach, thick) for s in (-1, 1)]
+    return [bar(0.0, s * y, reach, thick) for s in (-1, 1)]
 
 
 def middle_bar(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
@@ -157,7 +168,7 @@ def middle_bar(rng: Generator, outline: shapely.Polygon) -> list[Tether]:
     length, width = _extent(outline)
     thick, share = _bar_thickness(rng, width), rng.uniform(0.2, 0.75)
     return [
-        _bar(0.0, 0.0, share * length, thick) if rng.random() < 0.6 else _bar(0.0, 0.0, thick, share * width)
+        bar(0.0, 0.0, share * length, thick) if rng.random() < 0.6 else bar(0.0, 0.0, thick, share * width)
     ]
 
 
@@ -189,7 +200,8 @@ def _bar_thickness(rng: Generator, room: float) -> float:
     return float(np.exp(rng.uniform(np.log(1.0), np.log(max(1.5, min(6.0, room / 4))))))
 
 
-def _bar(x: float, y: float, length: float, width: float) -> PolygonTether:
+def bar(x: float, y: float, length: float, width: float) -> PolygonTether:
+    """A bar about (x, y), its length along x."""
     return PolygonTether(shapely.box(x - length / 2, y - width / 2, x + length / 2, y + width / 2))
 
 

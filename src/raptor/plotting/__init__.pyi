@@ -1,6 +1,7 @@
 # What the room gives, and where each name lives; `plot` is the front door.
 from .campaigns import descriptors_figure, outcomes_figure
 from .curve import curve_figure
+from .designs import designs_figure, front_figure
 from .drawing import (
     bulk_figure,
     design_figure,
@@ -36,11 +37,13 @@ __all__ = [
     "curve_figure",
     "descriptors_figure",
     "design_figure",
+    "designs_figure",
     "directors_figure",
     "draw_mould",
     "fields_figure",
     "fit_figure",
     "folding_figure",
+    "front_figure",
     "learning_figure",
     "models_figure",
     "mould_figure",

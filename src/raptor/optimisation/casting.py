@@ -1,0 +1,90 @@
+"""From vectors to moulds that can be made and cast, or to how far they are from that."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from raptor.core.errors import RaptorError
+from raptor.fields.resample import block_average
+from raptor.frame import IMAGE_SIZE
+from raptor.moulds.cast import HALF_SPAN, CastMould
+from raptor.moulds.geometry import Circle, Mould, Tether
+from raptor.optimisation.genes import Draft, draft
+from raptor.optimisation.spec import DesignSpec
+
+BROKEN = 10.0
+"""Violation of a vector that gives no outline at all."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A vector's mould, and by how much it violates the process; no mould where it cannot be made."""
+
+    cast: CastMould | None
+    violation: float
+
+    @cached_property
+    def cells(self) -> int:
+        """Number of cells, as `CastMould.n_cells` in a tenth of the time."""
+        assert self.cast is not None
+        return count_cells(self.cast)
+
+
+def decode(vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: int) -> Candidate:
+    """The mould of a vector (GENES,), cast with layers and imaged, or the violation that forbids it."""
+    try:
+        made = draft(vector, spec, layers)
+    except (ValueError, shapely.GEOSException):
+        return Candidate(None, BROKEN)
+    violation = violation_of(made, spec, layers)
+    if violation > 0:
+        return Candidate(None, violation)
+    try:
+        mould = Mould(made.outline, made.tethers, mm_per_l0=spec.mm_per_l0)
+        cast = CastMould(mould, layers, pixels)
+        return Candidate(cast if cast.image.depression.any() else None, 0.0)
+    except RaptorError:
+        return Candidate(None, BROKEN)
+
+
+def violation_of(made: Draft, spec: DesignSpec, layers: int) -> float:
+    """How far outline and tethers are from a mould: too many or few tethers, thin necks, few cells."""
+    low, high = spec.tethers
+    missing = float(max(low - len(made.tethers), len(made.tethers) - high, 0))
+    neck = made.outline.buffer(-spec.least["neck"] / 2)
+    if neck.is_empty or neck.geom_type != "Polygon":
+        missing += 1.0
+    cells = layers * (made.outline.area - sum(tether.area for tether in made.tethers))
+    return missing + max(0.9 * spec.mould_cells[0] / max(cells, 1.0) - 1, 0.0)
+
+
+def count_cells(cast: CastMould) -> int:
+    """Number of sites at least the clearance from walls, by shapes grown and shrunk by it."""
+    clearance, x = cast.clearance, np.arange(-HALF_SPAN, HALF_SPAN + 1.0)
+    inner = cast.mould.outline.buffer(-clearance)
+    shapely.prepare(inner)
+    total = 0
+    for parity in range(min(cast.layers, 2)):
+        points = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2) + 0.5 * parity
+        points = points[np.abs(points).max(axis=1) < IMAGE_SIZE / 2]
+        points = points[shapely.contains_xy(inner, points[:, 0], points[:, 1])]
+        for tether in cast.mould.tethers:
+            points = points[~_within(tether, points, clearance)]
+        total += len(points) * len(range(parity, cast.layers, 2))
+    return total
+
+
+def _within(tether: Tether, points: NDArray[np.float64], distance: float) -> NDArray[np.bool_]:
+    """Whether points (n, 2) lie in a tether or nearer to it than a distance."""
+    if isinstance(tether, Circle):
+        return np.asarray(tether.depth(points) > -distance)
+    grown = tether.polygon.buffer(distance)
+    return np.asarray(shapely.contains_xy(grown, points[:, 0], points[:, 1]))
+
+
+def masks(cast: CastMould, pixels: int) -> NDArray[np.float32]:
+    """Depression and tethers (2, y', x') as block averages, as networks see them."""
+    return block_average(np.stack([cast.depression, cast.tethers]).astype(np.float32), pixels)

@@ -1,0 +1,54 @@
+"""Many moulds at once, as fast as networks allow: for searches, which look at more than they keep."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from raptor.dataset.scaling import scale_inputs
+from raptor.parameters import CellParameters
+from raptor.surrogate.inference import BATCH, Surrogate
+from raptor.symmetry import Element, apply, move_pixels
+
+
+def outcomes(
+    surrogate: Surrogate,
+    masks: NDArray[np.float32],
+    cells: Sequence[int],
+    parameters: CellParameters,
+    count: int = 1,
+) -> NDArray[np.float32]:
+    """Fields (n, count, 8, y', x') of n moulds on the networks' raster, in physical units.
+
+    Each of the `count` outcomes is one network's answer to one image under D4, moved back: networks take
+    turns, then images, the first as it is. Networks that sample give one sample each.
+
+    Parameters
+    ----------
+    masks : ndarray (n, 2, y', x')
+        Depression and tethers, block averages on the networks' raster.
+    cells : sequence of int
+        Number of cells in each mould.
+
+    Raises
+    ------
+    RaptorError
+        If the parameters are out of the range that was sampled.
+    """
+    parameters.require_sampled("prediction")
+    pixels, stream = surrogate.architecture.pixels, torch.Generator().manual_seed(0)
+    totals = torch.tensor(cells, dtype=torch.float32) * (pixels / surrogate.pixels) ** 2
+    found = np.empty((len(masks), count, 8, pixels, pixels), np.float32)
+    for number in range(count):
+        turn, member = divmod(number, len(surrogate.members))
+        element = Element.from_index(turn % 8)
+        for start in range(0, len(masks), BATCH):
+            part = slice(start, start + BATCH)
+            moved = move_pixels(masks[part], element)
+            inputs = torch.from_numpy(np.stack([scale_inputs(*each, parameters) for each in moved]))
+            with torch.no_grad():
+                scaled = surrogate.members[member].answers(inputs, totals[part], 1, stream)[:, 0]
+            fields = surrogate.scaling.inverse(scaled.numpy())
+            found[part, number] = apply(fields, element.inverse)
+    return found

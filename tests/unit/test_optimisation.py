@@ -83,7 +83,7 @@ def test_posts_are_as_far_apart_as_their_polygons():
         ({"end_posts": 0.3}, 2, "mirrors"),  # one post at each end
         ({"end_posts": 0.3, "which_end": 0.7}, 1, "mirror"),
         ({"end_posts": 0.5, "end_spread": 1.0}, 4, "mirrors"),  # corners
-        ({"rim_posts": 0.61, "rim_start": 0.0}, 4, "mirrors"),
+        ({"rim_posts": 0.61, "rim_start": 0.0, "rim_inset": 0.0}, 4, "mirrors"),
         ({"centre": 0.6}, 1, "mirrors"),
         ({"bars": 0.7}, 2, "mirrors"),  # across the ends
         ({"bars": 0.9, "bar_inset": 0.0}, 2, "mirrors"),  # along the sides

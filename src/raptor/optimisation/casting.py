@@ -11,7 +11,7 @@ from raptor.core.errors import RaptorError
 from raptor.fields.resample import block_average
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds.cast import HALF_SPAN, CastMould
-from raptor.moulds.geometry import Circle, Mould, Tether
+from raptor.moulds.geometry import CLEARANCE, Circle, Mould, Tether
 from raptor.optimisation.genes import Draft, draft
 from raptor.optimisation.spec import DesignSpec
 
@@ -33,7 +33,9 @@ class Candidate:
         return count_cells(self.cast)
 
 
-def decode(vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: int) -> Candidate:
+def decode(
+    vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: int, clearance: float = CLEARANCE
+) -> Candidate:
     """The mould of a vector (GENES,), cast with layers and imaged, or the violation that forbids it."""
     try:
         made = draft(vector, spec, layers)
@@ -44,7 +46,7 @@ def decode(vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: i
         return Candidate(None, violation)
     try:
         mould = Mould(made.outline, made.tethers, mm_per_l0=spec.mm_per_l0)
-        cast = CastMould(mould, layers, pixels)
+        cast = CastMould(mould, layers, pixels, clearance)
         return Candidate(cast if cast.image.depression.any() else None, 0.0)
     except RaptorError:
         return Candidate(None, BROKEN)

@@ -1,11 +1,13 @@
 """Search for moulds as a user asks for it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from raptor.moulds.cast import CastMould
+from raptor.moulds.geometry import Mould
 from raptor.optimisation.designs import Designs
 from raptor.optimisation.evaluation import Evaluator
 from raptor.optimisation.finalists import best_of, choose, predicted, ranked, simulated
@@ -59,14 +61,14 @@ def design(
     return Designs(spec, tuple(everything), table, _front(found, spec), pd.DataFrame(found.progress))
 
 
-def _about(moulds: list[Any], group: str, evaluator: Evaluator) -> pd.DataFrame:
+def _about(moulds: Sequence[Mould], group: str, evaluator: Evaluator) -> pd.DataFrame:
     """Name, group, size and symmetry of moulds."""
-    casts = [evaluator.surrogate.cast(mould) for mould in moulds]
+    layers, pixels = evaluator.surrogate.layers, evaluator.surrogate.pixels
     return pd.DataFrame(
         {
             "design": [mould.name for mould in moulds],
             "group": group,
-            "n_cells": [cast.n_cells for cast in casts],
+            "n_cells": [CastMould(mould, layers, pixels).n_cells for mould in moulds],
             "n_tethers": [len(mould.tethers) for mould in moulds],
             "symmetry": [mould.symmetry for mould in moulds],
         }

@@ -60,7 +60,8 @@ class Evaluator:
 
     def decode(self, vector: NDArray[np.float64]) -> Candidate:
         """The mould of a vector, or its violation."""
-        return decode(vector, self.spec, self.surrogate.layers, self.surrogate.pixels)
+        known = self.surrogate
+        return decode(vector, self.spec, known.layers, known.pixels, known.clearance)
 
     def values(
         self, casts: Sequence[CastMould], samples: int | None = None

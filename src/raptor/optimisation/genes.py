@@ -123,19 +123,22 @@ def profile(gene: dict[str, float]) -> shapely.Polygon:
 
 
 def _outline(gene: dict[str, float], spec: DesignSpec, layers: int) -> shapely.Polygon:
-    polygon = profile(gene)
+    """The outline, rounded, as large as its gene says or as the frame allows, about the origin."""
     area = _between(gene["size"], *map(float, spec.mould_cells)) / layers
-    scale = np.sqrt(area / polygon.area)
-    x0, y0, x1, y1 = polygon.bounds
-    scale = min(scale, 2 * REACH / max(x1 - x0, y1 - y0))
-    polygon = shapely.transform(polygon, lambda xy: scale * (xy - ((x0 + x1) / 2, 0.0)))
-    radius = max(spec.least["corner"], 0.25 * scale * max(0.0, 2 * gene["rounding"] - 1))
+    polygon = _sized(profile(gene), area)
+    radius = max(spec.least["corner"], 0.25 * np.sqrt(area) * max(0.0, gene["rounding"] - 0.5))
     if radius > 0:
         polygon = rounded(polygon, radius, SEGMENTS)
-    polygon = polygon.simplify(1e-3)
     if polygon.is_empty or polygon.geom_type != "Polygon" or polygon.interiors:
         raise ValueError("the outline is in pieces")
-    return polygon
+    return _sized(polygon, area).simplify(1e-3)
+
+
+def _sized(polygon: shapely.Polygon, area: float) -> shapely.Polygon:
+    """A polygon scaled to an area, l0^2, or to the frame, with the middle of its length at the origin."""
+    x0, y0, x1, y1 = polygon.bounds
+    scale = min(np.sqrt(area / polygon.area), 2 * REACH / max(x1 - x0, y1 - y0))
+    return shapely.transform(polygon, lambda xy: scale * (xy - ((x0 + x1) / 2, 0.0)))
 
 
 def _groups(gene: dict[str, float], outline: shapely.Polygon, least: dict[str, float]) -> list[list[Tether]]:

@@ -127,7 +127,7 @@ class Budget(Block):
         0.2, ge=0, le=0.9, description="share of the evaluations for refinement of the front by CMA-ES"
     )
     samples: Positive = Field(
-        1, description="outcomes of each mould in the search: networks and images of D4, or samples"
+        3, description="outcomes of each mould in the search: networks and images of D4, or samples"
     )
     caution: float = Field(
         1.0, ge=0, description="standard deviations over outcomes by which an objective counts as worse"

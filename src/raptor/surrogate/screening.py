@@ -22,7 +22,8 @@ def outcomes(
     """Fields (n, count, 8, y', x') of n moulds on the networks' raster, in physical units.
 
     Each of the `count` outcomes is one network's answer to one image under D4, moved back: networks take
-    turns, then images, the first as it is. Networks that sample give one sample each.
+    turns, each with images of its own; eight times the networks are all. Networks that sample give one
+    sample each.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def outcomes(
     found = np.empty((len(masks), count, 8, pixels, pixels), np.float32)
     for number in range(count):
         turn, member = divmod(number, len(surrogate.members))
-        element = Element.from_index(turn % 8)
+        element = Element.from_index((turn + member) % 8)
         for start in range(0, len(masks), BATCH):
             part = slice(start, start + BATCH)
             moved = move_pixels(masks[part], element)

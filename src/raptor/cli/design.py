@@ -40,12 +40,12 @@ def design(
     if output.exists() and not output.is_dir():
         raise raptor.RaptorError(f"{output} is a file; give the name of a folder")
     opt.require_writable(output / "designs.csv" if output.is_dir() else output, kind="a folder")
-    said = (lambda note: None) if quiet else (lambda note: typer.echo(note, err=True))
     with progress("design", wanted.steps) as advance:
 
         def report(note: str) -> None:
             advance(note)
-            said(note)
+            if not quiet:
+                typer.echo(note, err=True)
 
         found = found_by(wanted, model, report)
     found.save(output)

@@ -60,7 +60,7 @@ def violation_of(made: Draft, spec: DesignSpec, layers: int) -> float:
     if neck.is_empty or neck.geom_type != "Polygon":
         missing += 1.0
     cells = layers * (made.outline.area - sum(tether.area for tether in made.tethers))
-    return missing + max(0.9 * spec.mould_cells[0] / max(cells, 1.0) - 1, 0.0)
+    return float(missing + max(0.9 * spec.mould_cells[0] / max(cells, 1.0) - 1, 0.0))
 
 
 def count_cells(cast: CastMould) -> int:

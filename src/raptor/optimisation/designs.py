@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import yaml
+from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, write_text
@@ -83,10 +85,14 @@ class Designs:
     @property
     def best(self) -> str:
         """Name of the finalist that is best in the first objective, if possible of those within limits."""
-        first, rows = self.spec.objectives[0], self.table[self.table["group"] == "searched"]
+        rows = self.table[self.table["group"] == "searched"]
         rows = rows[rows["rank"].notna()] if rows["rank"].notna().any() else rows
-        by = "simulated" if "simulated_meets" in rows else "predicted"
-        return str(rows.loc[(first.sign * rows[f"{by}_{first.label}"]).idxmin(), "design"])
+        return str(rows["design"].iloc[int(self._costs(rows).argmin())])
+
+    def _costs(self, rows: pd.DataFrame) -> NDArray[np.float64]:
+        """The first objective of rows, simulated if it was, smaller is better."""
+        first, by = self.spec.objectives[0], "simulated" if "simulated_meets" in rows else "predicted"
+        return first.sign * rows[f"{by}_{first.label}"].to_numpy(dtype=float)
 
     @property
     def searched(self) -> Sequence[Mould]:
@@ -97,12 +103,13 @@ class Designs:
     def __str__(self) -> str:
         first = self.spec.objectives[0]
         by = "simulated" if "simulated_meets" in self.table else "predicted"
-        column = f"{by}_{first.label}"
-        best = {
-            group: (part[column] * first.sign).min() * first.sign
-            for group, part in self.table[self.table["rank"].notna()].groupby("group")
-        }
-        said = ", ".join(f"{group} {value:.3f}" for group, value in sorted(best.items(), reverse=True))
+        good = self.table[self.table["rank"].notna()]
+        parts = {group: good[good["group"] == group] for group in ("searched", "compared")}
+        said = ", ".join(
+            f"{group} {first.sign * self._costs(part).min():.3f}"
+            for group, part in parts.items()
+            if len(part)
+        )
         last = self.progress.iloc[-1]
         rate = last["evaluations"] / last["seconds"]
         agree = "".join(

@@ -113,7 +113,7 @@ def best_of(moulds: Sequence[Mould], evaluator: Evaluator) -> list[Mould]:
 
 def _table(values: Mapping[str, NDArray[np.float64]], spec: DesignSpec, by: str) -> pd.DataFrame:
     """Means and standard deviations of values (n, m) by label, and whether the constraints are met."""
-    columns: dict[str, NDArray[np.generic]] = {}
+    columns: dict[str, NDArray[np.float64]] = {}
     for label, each in values.items():
         columns[f"{by}_{label}"] = each.mean(axis=1)
         if label != "distance" and each.shape[1] > 1:

@@ -51,8 +51,8 @@ def _front(axes: Axes, found: "Designs") -> None:
             (x0, y0), (x1, y1) = places["predicted"], places["simulated"]
             axes.plot([x0, x1], [y0, y1], "-", color="#999999", lw=0.5, zorder=0)
         last = places.get("simulated", places["predicted"])
-        for name, *place in zip(part["design"], *last, strict=True):
-            axes.annotate(str(name), place, xytext=(4, 3), textcoords="offset points", fontsize=6)
+        for name, across, up in zip(part["design"], *last, strict=True):
+            axes.annotate(str(name), (across, up), xytext=(4, 3), textcoords="offset points", fontsize=6)
     axes.set(xlabel=x.replace("_", " "), ylabel=(y or "").replace("_", " "))
     axes.legend(frameon=False, fontsize=7)
 

@@ -47,7 +47,9 @@ def outcomes(
         for start in range(0, len(masks), BATCH):
             part = slice(start, start + BATCH)
             moved = move_pixels(masks[part], element)
-            inputs = torch.from_numpy(np.stack([scale_inputs(*each, parameters) for each in moved]))
+            inputs = torch.from_numpy(
+                np.stack([scale_inputs(depression, tethers, parameters) for depression, tethers in moved])
+            )
             with torch.no_grad():
                 scaled = surrogate.members[member].answers(inputs, totals[part], 1, stream)[:, 0]
             fields = surrogate.scaling.inverse(scaled.numpy())

@@ -53,12 +53,9 @@ def decode(
 
 
 def violation_of(made: Draft, spec: DesignSpec, layers: int) -> float:
-    """How far outline and tethers are from a mould: too many or few tethers, thin necks, few cells."""
+    """How far outline and tethers are from a mould: too many or few tethers, too few cells."""
     low, high = spec.tethers
     missing = float(max(low - len(made.tethers), len(made.tethers) - high, 0))
-    neck = made.outline.buffer(-spec.least["neck"] / 2)
-    if neck.is_empty or neck.geom_type != "Polygon":
-        missing += 1.0
     cells = layers * (made.outline.area - sum(tether.area for tether in made.tethers))
     return float(missing + max(0.9 * spec.mould_cells[0] / max(cells, 1.0) - 1, 0.0))
 

@@ -44,12 +44,13 @@ class Designs:
 
     @property
     def agreement(self) -> dict[str, float]:
-        """Correlation of predicted and simulated values over the moulds, by objective."""
-        if "simulated_meets" not in self.table:
+        """Correlation of predicted and simulated values over the finalists, by objective; of two none."""
+        rows = self.table[self.table["group"] == "searched"]
+        if "simulated_meets" not in rows or len(rows) < 3:
             return {}
         pairs = {
             each.label: [
-                self.table[f"{by}_{each.label}"].to_numpy(dtype=float) for by in ("predicted", "simulated")
+                rows[f"{by}_{each.label}"].to_numpy(dtype=float) for by in ("predicted", "simulated")
             ]
             for each in self.spec.objectives
         }

@@ -123,9 +123,14 @@ def profile(gene: dict[str, float]) -> shapely.Polygon:
 
 
 def _outline(gene: dict[str, float], spec: DesignSpec, layers: int) -> shapely.Polygon:
-    """The outline, rounded, as large as its gene says or as the frame allows, about the origin."""
+    """The outline, rounded, as large as its gene says or as the frame allows, about the origin.
+
+    Parts too narrow for the process are cut off.
+    """
     area = _between(gene["size"], *map(float, spec.mould_cells)) / layers
+    neck = spec.least["neck"] / 2
     polygon = _sized(profile(gene), area)
+    polygon = polygon.buffer(-neck, join_style="mitre").buffer(neck, join_style="mitre")  # without slivers
     radius = max(spec.least["corner"], 0.25 * np.sqrt(area) * max(0.0, gene["rounding"] - 0.5))
     if radius > 0:
         polygon = rounded(polygon, radius, SEGMENTS)

@@ -19,6 +19,7 @@ WORST = 1e3
 """Objective of a vector without a mould."""
 UNMEASURED = 10.0
 """Violation of a constraint that could not be measured: larger than any that could."""
+TOGETHER = 64  # moulds predicted at once, to bound memory
 LARGEST_DISTANCE = 1.0  # to the training set, where the specification does not say
 
 
@@ -67,22 +68,39 @@ class Evaluator:
         self, casts: Sequence[CastMould], samples: int | None = None
     ) -> dict[str, NDArray[np.float64]]:
         """Each measure (n, samples) by label, and `distance` and `held`, of n moulds."""
-        spec, surrogate = self.spec, self.surrogate
-        count, pixels = samples or spec.search.samples, surrogate.architecture.pixels
-        images = np.stack([masks(cast, pixels) for cast in casts])
-        found = outcomes(surrogate, images, [count_cells(cast) for cast in casts], spec.parameters, count)
-        labels = [*spec.measured, "held", "distance"]
-        values = {label: np.full((len(casts), count), np.nan) for label in labels}
-        for number, (cast, samples_of) in enumerate(zip(casts, found, strict=True)):
-            values["distance"][number] = self.distance(cast)
-            view = View(cast, pixels)
-            for sample, fields in enumerate(samples_of):
-                whole = fields * (surrogate.pixels / pixels) ** 2
-                for label, what in spec.measured.items():
-                    if what.measure not in ("held", "distance"):
-                        values[label][number, sample] = measure(what, whole, view, self.factor, spec.unit)
-                values["held"][number, sample] = all_held(whole, view, self.factor)
+        count = samples or self.spec.search.samples
+        values = {
+            label: np.full((len(casts), count), np.nan) for label in (*self.spec.measured, "held", "distance")
+        }
+        for start in range(0, len(casts), TOGETHER):
+            part = casts[start : start + TOGETHER]
+            for number, (cast, found) in enumerate(
+                zip(part, self._outcomes(part, count), strict=True), start
+            ):
+                for label, each in self._measured(cast, found).items():
+                    values[label][number] = each
         return values
+
+    def _outcomes(self, casts: Sequence[CastMould], count: int) -> NDArray[np.float32]:
+        """Fields (n, count, 8, y', x') of moulds, per pixel of the networks' raster."""
+        pixels = self.surrogate.architecture.pixels
+        images, cells = (
+            np.stack([masks(cast, pixels) for cast in casts]),
+            [count_cells(cast) for cast in casts],
+        )
+        found = outcomes(self.surrogate, images, cells, self.spec.parameters, count)
+        return found * np.float32((self.surrogate.pixels / pixels) ** 2)
+
+    def _measured(self, cast: CastMould, found: NDArray[np.float32]) -> dict[str, list[float]]:
+        """Each measure of a mould's outcomes (count, 8, y', x') by label, `held` and `distance` among them."""
+        view, unit = View(cast, found.shape[-1]), self.spec.unit
+        values = {
+            label: [measure(what, fields, view, self.factor, unit) for fields in found]
+            for label, what in self.spec.measured.items()
+            if what.measure not in ("held", "distance")
+        }
+        held = [float(all_held(fields, view, self.factor)) for fields in found]
+        return values | {"held": held, "distance": len(found) * [self.distance(cast)]}
 
     @property
     def factor(self) -> float:

@@ -92,7 +92,7 @@ class Evaluator:
         return found * np.float32((self.surrogate.pixels / pixels) ** 2)
 
     def _measured(self, cast: CastMould, found: NDArray[np.float32]) -> dict[str, list[float]]:
-        """Each measure of a mould's outcomes (count, 8, y', x') by label, `held` and `distance` among them."""
+        """Each measure of a mould's outcomes (count, 8, y', x') by label, with `held` and `distance`."""
         view, unit = View(cast, found.shape[-1]), self.spec.unit
         values = {
             label: [measure(what, fields, view, self.factor, unit) for fields in found]

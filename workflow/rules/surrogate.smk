@@ -301,6 +301,24 @@ rule ship_model:
         "../scripts/ship_model.py"
 
 
+rule designer:
+    """Write the page on which one draws a mould and sees what the surrogate predicts."""
+    input:
+        weights=rules.ship_model.output.weights,
+        model=rules.ship_model.output.model,
+    output:
+        page=f"{RESULTS}/designer.html",
+    log:
+        f"{RESULTS}/logs/designer.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/designer.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    script:
+        "../scripts/designer.py"
+
+
 rule evaluate:
     """The errors of all models."""
     input:

@@ -10,6 +10,7 @@ import typer
 
 from raptor.cli.data import check, fetch, progress, reference, same, trace, well
 from raptor.cli.design import design
+from raptor.cli.designer import designer
 from raptor.cli.draw import draw
 from raptor.cli.fit import fit
 from raptor.cli.library import moulds, tissues
@@ -30,8 +31,8 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, simulate, predict, plot, sweep, fit, design, measure, check, trace, same, progress,
-    well, fetch, reference,
+    moulds, tissues, draw, designer, simulate, predict, plot, sweep, fit, design, measure, check, trace, same,
+    progress, well, fetch, reference,
 )  # fmt: skip
 
 

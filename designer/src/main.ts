@@ -53,7 +53,7 @@ worker.onmessage = ({ data }) => {
     const ask = asksOf.get(data.id);
     asksOf.delete(data.id);
     if (!ask) return;
-    if (data.kind === "failed") trouble = data.error;
+    if (data.kind === "failed") trouble ||= ask.key === keyOf(design) ? data.error : "";
     else take({ found: data.found, whole: data.whole, key: ask.key }, ask.at);
   }
   isDirty = true;
@@ -64,7 +64,6 @@ function take(found: Result, at: number): void {
   if (isOld && (found.whole || result?.key === keyOf(design))) return;
   if (!found.whole && result?.whole && result.key === found.key) return;
   result = found;
-  trouble = "";
   sample = 0;
   redraw();
   if (!found.whole) times.drags.push(performance.now() - at);

@@ -2,6 +2,7 @@
 from .condor.simulate import Tissue, simulate
 from .core.errors import RaptorError
 from .core.version import MODEL_VERSION, __version__
+from .dataset.masks import rasterise
 from .dataset.result import load_fields, save
 from .fitting.command import fit
 from .fitting.fitted import FittedTissue
@@ -42,6 +43,7 @@ __all__ = [
     "measure",
     "plot",
     "predict",
+    "rasterise",
     "read_mould",
     "save",
     "simulate",

@@ -91,6 +91,24 @@ def test_bad_input_to_draw(arguments, message):
     assert message in done.stderr
 
 
+def test_masks_are_written_and_read_as_a_mould_again(tmp_path):
+    masks, picture, drawn = tmp_path / "m.nc", tmp_path / "m.png", DOG_BONE / "dog_bone.geojson"
+    for output in (masks, picture):
+        done = raptor("rasterise", drawn, "--pixels", 512, "--output", output)
+        assert done.returncode == 0, done.stderr
+    mould, again = read_mould(drawn), read_mould(picture)
+    assert len(again.tethers) == 4
+    assert again.outline.symmetric_difference(mould.outline).area < 0.02 * mould.outline.area
+    with xr.open_dataset(masks) as found:
+        area = float(found["depression"].sum()) * (62.5 / 512) ** 2
+        assert area == pytest.approx(mould.depression.area, rel=0.01)
+        assert not (found["depression"] & found["tethers"]).any()
+        assert mould_of(found).outline.equals(mould.outline)
+    assert "m.jpg is no name for masks" in raptor("rasterise", drawn, "--output", "m.jpg").stderr
+    done = raptor("plot", masks, "--output", tmp_path / "p.png")
+    assert "does not hold the fields of one tissue" in done.stderr
+
+
 def test_the_library_is_listed():
     lines = raptor("moulds").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(MOULDS)

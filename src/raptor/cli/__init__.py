@@ -17,6 +17,7 @@ from raptor.cli.library import moulds, tissues
 from raptor.cli.measure import measure
 from raptor.cli.plot import plot
 from raptor.cli.predict import predict
+from raptor.cli.rasterise import rasterise
 from raptor.cli.simulate import simulate
 from raptor.cli.sweep import sweep
 from raptor.core.errors import RaptorError
@@ -31,7 +32,8 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, designer, simulate, predict, plot, sweep, fit, design, measure, check, trace, same,
+    moulds, tissues, draw, rasterise, simulate, predict, plot, sweep, designer, fit, measure, check, trace,
+    same, progress, well, fetch, reference,
     progress, well, fetch, reference,
 )  # fmt: skip
 

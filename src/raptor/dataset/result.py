@@ -75,7 +75,7 @@ def load_fields(path: str | Path) -> xr.Dataset:
         fields = xr.load_dataset(path, engine="netcdf4")
     except (OSError, ValueError) as error:
         raise RaptorError(f"{path} {why_unreadable(path, error)}") from error
-    if "mould" not in fields.attrs:
+    if "mould" not in fields.attrs or "density" not in fields:
         raise RaptorError(
             f"{path} does not hold the fields of one tissue; give a file from raptor simulate or predict"
         )

@@ -13,12 +13,14 @@ from raptor.frame import IMAGE_SIZE, pixel_centres
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geojson import from_feature
 from raptor.moulds.geometry import Mould
+from raptor.moulds.raster import mould_image
 from raptor.parameters import PARAMETERS, CellParameters
 from raptor.symmetry import FIELDS
 
 if TYPE_CHECKING:
     import xarray as xr
 
+PLANE = ("y", "x")
 LONG_NAMES = {
     "density": "cells per pixel",
     "tension": "sum over cells of their mean bond tension, in kappa0 l0 per pixel",
@@ -70,27 +72,43 @@ def labelled(
     """
     import xarray as xr  # here, because simulations do without it
 
-    plane = ("y", "x")
-    axes = {axis: (axis, pixel_centres(cast.pixels), named(f"pixel centre {axis}, in l0")) for axis in "yx"}
-    masks = {
-        "depression": (plane, cast.depression, named("whether cells may lie here")),
-        "tethers": (plane, cast.tethers, named("whether there is a tether here")),
-    }
+    masks = labelled_masks(cast)
     numbers = {
         name: (("tether",) * np.ndim(value), value, named((PARAMETERS | MEASURES | TETHER_MEASURES)[name]))
         for name, value in {**asdict(parameters), **measures}.items()
     }
     return xr.Dataset(
-        {name: (plane, image, named(LONG_NAMES[name])) for name, image in zip(FIELDS, fields, strict=True)},
-        {**axes, **masks, **numbers},
+        {name: (PLANE, image, named(LONG_NAMES[name])) for name, image in zip(FIELDS, fields, strict=True)},
+        {**masks.coords, **masks.data_vars, **numbers},
         {
-            "mould": json.dumps(cast.mould.as_feature()),
-            "frame_size": IMAGE_SIZE,
+            **masks.attrs,
             "layers": cast.layers,
             "n_cells": cast.n_cells,
             **attributes,
         },
     )
+
+
+def labelled_masks(mould: "Mould | CastMould", pixels: int = 256) -> "xr.Dataset":
+    """Masks (y, x) of depression and tethers of a mould, with pixel centres and the mould.
+
+    Raises
+    ------
+    RaptorError
+        If the depression covers no pixel.
+    """
+    import xarray as xr
+
+    image = mould_image(mould, pixels) if isinstance(mould, Mould) else mould.image
+    masks = {
+        "depression": (PLANE, image.depression, named("whether cells may lie here")),
+        "tethers": (PLANE, image.tethers, named("whether there is a tether here")),
+    }
+    centres = pixel_centres(len(image.depression))
+    axes = {axis: (axis, centres, named(f"pixel centre {axis}, in l0")) for axis in "yx"}
+    shape = mould if isinstance(mould, Mould) else mould.mould
+    about = {"mould": json.dumps(shape.as_feature()), "frame_size": IMAGE_SIZE}
+    return xr.Dataset(masks, axes, about)
 
 
 def named(long_name: str, units: str = "1") -> Mapping[str, str]:

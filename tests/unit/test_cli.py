@@ -246,7 +246,7 @@ def test_predict_writes_fields_that_check_takes(tmp_path):
 
 
 def test_the_shipped_model_predicts_without_training(tmp_path):
-    from raptor.surrogate.files import SHIPPED
+    from raptor.surrogate.rules import SHIPPED
 
     size = sum(path.stat().st_size for path in SHIPPED.iterdir())
     assert size < 20e6

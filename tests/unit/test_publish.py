@@ -19,7 +19,7 @@ from raptor.dataset.design import read_design
 from raptor.dataset.fetch import fetch
 from raptor.dataset.publish import MANIFEST, place, publish, read_manifest
 from raptor.dataset.stack import read_samples
-from raptor.surrogate.files import SHIPPED
+from raptor.surrogate.rules import SHIPPED
 from tests.small import CAMPAIGN, MINI, ROOT
 
 STACK = "campaigns/paper/fields.nc"

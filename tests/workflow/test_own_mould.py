@@ -2,6 +2,7 @@
 
 import shutil
 
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -9,6 +10,7 @@ import yaml
 from raptor.config import load
 from raptor.core.errors import RaptorError
 from tests.small import ROOT
+from tests.stand_ins import untrained
 from tests.workflow.place import parsed
 
 MOULDS = ROOT / "tests" / "data" / "moulds"
@@ -39,6 +41,32 @@ def test_a_mould_of_ones_own_gives_its_table_and_curves(workplace, tmp_path):
     assert (place.folder / figure).stat().st_size > 10_000
     curves = pd.read_csv(place.folder / "results" / "mine" / "figures" / "contraction_bench.csv")
     assert curves["seeds"].tolist() == [2] * 6
+
+
+def test_a_trained_model_serves_sweeps_and_fits_of_ones_own(workplace, tmp_path):
+    place = workplace("trained")
+    untrained(tmp_path / "model")
+    shutil.copy(MOULDS / "dog_bone.geojson", tmp_path / "bench.geojson")
+    grid = {"delta": [0.2, 0.8], "kappa_nnn": [0.5], "ratio": [0.6]}
+    settings = {
+        "trained_model": "model", "layers": 4, "pixels": 32, "mould_scale": 1.0,
+        "fit": {"tissues": ["glial_1"]}, "tradeoff": {"cases": {}},
+        "campaigns": {"bench": {"moulds": "bench.geojson", "grid": grid}},
+    }  # fmt: skip
+    content = {name: value for name, value in SMALL.items() if name != "models"} | settings
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content))
+    wanted = ["results/mine/figures/contraction_bench.png", "results/mine/fits/glial_1.json"]
+    done = place.run("--cores", "2", *wanted, configuration=path)
+    assert done.returncode == 0, done.stderr[-3000:]
+    curves = pd.read_csv(place.folder / "results" / "mine" / "figures" / "contraction_bench.csv")
+    assert np.isfinite(curves[["simulated", "predicted"]]).all(axis=None)
+    assert not {"train_member", "assemble_model", "evaluate_model"} & set(
+        place.jobs("all", configuration=path)
+    )
+    path.write_text(yaml.safe_dump(content | {"layers": 3}))
+    with pytest.raises(RaptorError, match="trained_model was made for 4; set layers: 4"):
+        parsed(path)
 
 
 def test_a_folder_of_moulds_is_simulated_at_a_sample_of_parameters(workplace, tmp_path):

@@ -48,7 +48,7 @@ for campaign in SWEEPS:
         "moulds": expand(rules.design_campaign.output.moulds, campaign=campaign)[0],
         "predicted": (
             expand(rules.predict_campaign.output.fields, campaign=campaign)
-            if MODELS
+            if CONFIG.has_surrogate
             else []
         ),
     }

@@ -3,7 +3,7 @@
 # Settings of the simulations made by fits.
 SIMULATOR = {**CONFIG.simulator, "pixels": CONFIG.pixels, "seed": CONFIG.seed}
 FITTED = list(TISSUES)
-JOINT = CONFIG.fit.joint if MODELS else ()
+JOINT = CONFIG.fit.joint if CONFIG.has_surrogate else ()
 
 
 rule fit_tissue:
@@ -27,9 +27,7 @@ rule fit_tissue:
         tissue=lambda wildcards: TISSUES[wildcards.tissue].model_dump(mode="json"),
         mould_scale=CONFIG.mould_scale,
         simulator=SIMULATOR,
-        configuration=(
-            CONFIG.model_fingerprint(CONFIG.surrogate) if CONFIG.surrogate else None
-        ),
+        configuration=CONFIG.surrogate_fingerprint,
     script:
         "../scripts/fit_tissue.py"
 

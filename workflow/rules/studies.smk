@@ -28,7 +28,7 @@ rule compare_contraction:
     """Compare contraction, simulated and predicted: the largest difference and its position."""
     input:
         simulated=rules.tabulate_campaign.output.table,
-        predicted=rules.predict_campaign.output.table if MODELS else [],
+        predicted=rules.predict_campaign.output.table if CONFIG.has_surrogate else [],
     output:
         table=report(
             f"{STUDY}/contraction.csv",

@@ -119,11 +119,13 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The surrogate: the model used for fits and figures.
+# The surrogate: the model used for fits and figures, trained here or elsewhere.
 SURROGATE = {
     name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate or [])
     for name in ("weights", "model", "history")
 }
+if CONFIG.trained_folder:
+    SURROGATE["weights"] = [str(CONFIG.trained_folder / "weights.safetensors")]
 
 
 rule train:

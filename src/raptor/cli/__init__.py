@@ -32,9 +32,8 @@ Example:
   raptor predict mould.svg --tissue glial_1 --output prediction.nc
 """
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    moulds, tissues, draw, rasterise, simulate, predict, plot, sweep, designer, fit, measure, check, trace,
-    same, progress, well, fetch, reference,
-    progress, well, fetch, reference,
+    moulds, tissues, draw, rasterise, designer, simulate, predict, plot, sweep, fit, design, measure, check,
+    trace, same, progress, well, fetch, reference,
 )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """The whole configuration: one model that defines defaults, JSON schema and key table."""
 
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -14,6 +15,7 @@ from raptor.moulds.families import MouldFamilies
 from raptor.moulds.random_moulds import MARGIN, RandomMoulds
 from raptor.parameters import NetworkModel
 from raptor.studies.tradeoff import SURROGATE, Tradeoff
+from raptor.surrogate.rules import SHIPPED
 
 CAMPAIGNS = {
     "paper": Campaign(runs=64, test=12, validation=8, edge=8),
@@ -73,12 +75,25 @@ class Configuration(Block):
         None,
         description="the surrogate: the model used for fits and figures; null: the first",
     )
+    trained_model: str | None = Field(
+        None,
+        description="a trained surrogate for sweeps and fits, instead of training one: shipped, or a model's "
+        "folder; layers and pixels must be those it was made for, and models is empty",
+    )
     fit: Fit = Field(default_factory=lambda: Fit())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
     searches: dict[Name, str] = Field(
         default_factory=dict,
         description="searches for moulds by the surrogate, by name: files as in docs/design.md",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _train_none(cls, given: Any) -> Any:
+        """With a trained model, no model by default."""
+        if isinstance(given, dict) and given.get("trained_model") is not None:
+            return {"models": {}, **given}
+        return given
 
     @field_validator("models", mode="before")
     @classmethod
@@ -98,6 +113,8 @@ class Configuration(Block):
             raise ValueError(
                 f"selected_model is '{self.selected_model}'; allowed are {', '.join(self.models)}"
             )
+        if self.trained_model is not None and self.models:
+            raise ValueError("trained_model: nothing is trained beside it; omit models")
         for name, campaign in self.campaigns.items():
             self._check_campaign(name, campaign)
         for name, model in self.models.items():
@@ -183,6 +200,25 @@ class Configuration(Block):
         return self.selected_model or next(iter(self.models), None)
 
     @property
+    def has_surrogate(self) -> bool:
+        """Whether there is a surrogate for sweeps and fits, trained here or elsewhere."""
+        return bool(self.models) or self.trained_model is not None
+
+    @property
+    def trained_folder(self) -> Path | None:
+        """The folder of the trained model; None if none is used."""
+        if self.trained_model is None:
+            return None
+        return SHIPPED if self.trained_model == "shipped" else Path(self.trained_model)
+
+    @property
+    def surrogate_fingerprint(self) -> str | None:
+        """Hash of the configuration that the surrogate depends on; of its place, if trained elsewhere."""
+        if self.surrogate is None:
+            return content_hash(self.trained_model) if self.trained_model else None
+        return self.model_fingerprint(self.surrogate)
+
+    @property
     def main_campaign(self) -> str | None:
         """The first campaign of the first model: figures and baselines are of its test runs; None without."""
         return next((model.campaigns[0] for model in self.models.values()), None)
@@ -259,7 +295,7 @@ class Configuration(Block):
     @property
     def compares_surrogate(self) -> bool:
         """Whether a surrogate is compared with methods of simulation."""
-        return bool(self.models) and SURROGATE in self.tradeoff.methods
+        return self.has_surrogate and SURROGATE in self.tradeoff.methods
 
     def fingerprint(self, stage: Literal["design", "simulation", "fields"], campaign: str) -> str:
         """Hash of the configuration that a campaign's files of a stage depend on, model version included."""

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from raptor.config.configuration import Configuration
 from raptor.core.blocks import explain, read_yaml
 from raptor.core.errors import RaptorError
+from raptor.core.files import read_json
 from raptor.moulds.cast import cast_sites, central_section
 from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
 from raptor.moulds.reading import read_at_scale, read_mould
@@ -55,9 +56,11 @@ def _with_paths(configuration: Configuration, folders: Sequence[Path]) -> Config
         fit = fit.model_copy(update={"tissues_file": _found(fit.tissues_file, folders)})
     tradeoff = configuration.tradeoff.model_copy(update={"cases": cases})
     searches = {name: _found(path, folders) for name, path in configuration.searches.items()}
-    return configuration.model_copy(
-        update={"campaigns": campaigns, "tradeoff": tradeoff, "fit": fit, "searches": searches}
-    )
+    trained = configuration.trained_model
+    if trained not in (None, "shipped"):
+        trained = _found(trained, folders)
+    changed = {"campaigns": campaigns, "tradeoff": tradeoff, "fit": fit, "searches": searches}
+    return configuration.model_copy(update=changed | {"trained_model": trained})
 
 
 def _found(name: str, folders: Sequence[Path]) -> str:
@@ -89,8 +92,9 @@ def checked(
             others(read_spec(path).compare)
         except RaptorError as error:
             raise RaptorError(f"searches.{name}: {error}") from error
+    require_usable(configuration)
     fit = configuration.fit
-    tissues = load_tissues(fit.tissues_file, fit.tissues if configuration.models else ())
+    tissues = load_tissues(fit.tissues_file, fit.tissues if configuration.has_surrogate else ())
     require_measurable(tissues, configuration.mould_scale)
     return configuration, tissues
 
@@ -111,6 +115,25 @@ def require_castable(configuration: Configuration) -> None:
             raise RaptorError(f"campaigns.{name}: {error}") from error
     for case in configuration.tradeoff.cases.values():
         cast_sites(read_mould(case.mould), 1)
+
+
+def require_usable(configuration: Configuration) -> None:
+    """Check before any work that a trained model is there, and made for the configuration's tissues.
+
+    Raises
+    ------
+    RaptorError
+        If it is not.
+    """
+    if configuration.trained_folder is None:
+        return
+    model = read_json(configuration.trained_folder / "model.json")
+    for key in ("layers", "pixels"):
+        if model[key] != getattr(configuration, key):
+            raise RaptorError(
+                f"{key} is {getattr(configuration, key)}, but trained_model was made for {model[key]}; set "
+                f"{key}: {model[key]}"
+            )
 
 
 def require_measurable(tissues: Mapping[str, MeasuredTissue], mould_scale: float) -> None:

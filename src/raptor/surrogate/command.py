@@ -8,9 +8,10 @@ from typing import overload
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, require_parameters
-from raptor.surrogate.files import SHIPPED, load
+from raptor.surrogate.files import load
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.prediction import Prediction
+from raptor.surrogate.rules import SHIPPED
 
 
 def load_surrogate(path: str | Path | None = None) -> Surrogate:

@@ -20,7 +20,6 @@ from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.rules import Architecture
 
-SHIPPED = Path(__file__).parent / "shipped"
 DESCRIPTORS = "training_descriptors"  # beside the weights
 WEIGHTS, MODEL = "weights.safetensors", "model.json"
 

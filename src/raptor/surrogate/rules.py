@@ -1,10 +1,14 @@
 """Architecture and training of a model: blocks of configuration keys that the package uses directly."""
 
+from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from raptor.core.blocks import Block, Name, Positive
+
+SHIPPED = Path(__file__).parent / "shipped"
+"""The folder of the model that comes with the package."""
 
 
 class Architecture(Block):

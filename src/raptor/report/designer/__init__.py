@@ -61,8 +61,9 @@ def write_designer(path: Path, model: Path | None = None) -> int:
         If the surrogate cannot be read or is not calibrated, its networks cannot be written as ONNX, or the
         page would be larger than 20 MB.
     """
-    from raptor.surrogate.files import SHIPPED, load, read_description
+    from raptor.surrogate.files import load, read_description
     from raptor.surrogate.onnx_export import export_networks
+    from raptor.surrogate.rules import SHIPPED
 
     model = SHIPPED if model is None else model
     surrogate = load(model)

@@ -9,6 +9,7 @@ import yaml
 
 from raptor.cli import options as opt
 from raptor.core.errors import RaptorError
+from raptor.core.jobs import progress as bar
 
 
 def progress(
@@ -35,7 +36,9 @@ def well(
     """
     from raptor.dataset.well import write_well
 
-    for path in write_well(stack, folder):
+    with bar("copy", None):
+        paths = write_well(stack, folder)
+    for path in paths:
         typer.echo(path)
 
 
@@ -57,7 +60,8 @@ def fetch(
         raise RaptorError(f"{folder} is a file; choose a folder by --output")
     if folder.resolve() == Path(source).resolve():
         raise RaptorError(f"{folder} is the source itself; choose another folder by --output")
-    count = bring(source, folder)
+    with bar("fetch", None) as advance:
+        count = bring(source, folder, lambda name, files: advance(f"{name}, of {files} files"))
     typer.echo(f"{folder}: {count} files, every checksum right")
 
 
@@ -82,7 +86,8 @@ def check(
 
     if not path.exists():
         raise RaptorError(f"{path} does not exist; check the path")
-    faults = find_faults(path, part, partial(read_mould, scale=scale, mm_per_l0=mm_per_l0, page=page))
+    with bar("check", None):
+        faults = find_faults(path, part, partial(read_mould, scale=scale, mm_per_l0=mm_per_l0, page=page))
     for fault in faults:
         typer.echo(fault)
     typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")
@@ -122,7 +127,8 @@ def same(
     """
     from raptor.dataset.compare import differences
 
-    found = differences(first, second)
+    with bar("comparison", None):
+        found = differences(first, second)
     for difference in found:
         typer.echo(difference)
     typer.echo("not the same data" if found else "the same data")

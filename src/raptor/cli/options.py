@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import raptor
+from raptor.core.jobs import progress
 
 if TYPE_CHECKING:
     from raptor.dataset.result import Result
@@ -142,7 +143,8 @@ def measured(
 ) -> raptor.MeasuredPhotograph:
     """Measure a photograph and write its overlay, which shows a refused one too."""
     try:
-        found = raptor.measure(photograph, mould, **options)
+        with progress("measurement", None):
+            found = raptor.measure(photograph, mould, **options)
     except raptor.MeasurementError as refused:
         save_picture(refused, overlay)
         seen = f"see {overlay}" if overlay is not None else "--overlay FILE.png shows how far it came"

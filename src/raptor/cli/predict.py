@@ -2,6 +2,7 @@
 
 import raptor
 from raptor.cli import options as opt
+from raptor.core.jobs import progress
 
 
 def predict(
@@ -33,7 +34,8 @@ def predict(
     shape = opt.read_mould(mould, scale, mm_per_l0, page)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
-    found = raptor.predict(shape, cells, model)
+    with progress("prediction", None):
+        found = raptor.predict(shape, cells, model)
     point = f"--delta {cells.delta:g} --kappa-nnn {cells.kappa_nnn:g} --kappa-nnnn {cells.kappa_nnnn:g}"
     then = (
         f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} {point} --output simulated.nc"

@@ -6,6 +6,7 @@ import typer
 
 import raptor
 from raptor.cli import options as opt
+from raptor.core.jobs import progress
 
 
 def simulate(
@@ -41,4 +42,6 @@ def simulate(
     shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
-    opt.finish(raptor.simulate(shape, cells, layers, accuracy, seed), output, picture, fields, as_json)
+    with progress("simulation", None):
+        found = raptor.simulate(shape, cells, layers, accuracy, seed)
+    opt.finish(found, output, picture, fields, as_json)

@@ -64,7 +64,15 @@ def sweep(
         save_picture(curve_figure(table, shape.name), picture)
     unusual = int((table["unusual"] != "").sum())
     said = f"; {unusual} unlike the training set, see its column 'unusual'" if unusual else ""
-    typer.echo(f"{output}: {len(table)} points{said}")
+    then = "" if simulate else _then(given, opt.words(mould, scale, mm_per_l0, page), output, picture)
+    opt.report(f"{output}: {len(table)} points{said}", {}, False, then)
+
+
+def _then(given: dict[str, str], mould: str, output: Path, picture: Path | None) -> str:
+    """The next command: the same points, simulated too, and a picture."""
+    points = " ".join(f"{option} {value}" for option, value in given.items())
+    drawn = opt.quote(picture or output.with_suffix(".png"))
+    return f"raptor sweep {mould} {points} --simulate 2 --output {opt.quote(output)} --picture {drawn}"
 
 
 def _values(option: str, text: str) -> list[float]:

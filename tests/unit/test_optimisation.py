@@ -22,6 +22,7 @@ from raptor.optimisation.search import search, undominated
 from raptor.optimisation.spec import Measured, read_spec, with_changes
 from raptor.raster import density_threshold
 from raptor.symmetry import FIELDS
+from tests.commands import raptor as command_line
 
 LAYERS, PIXELS = 2, 64
 SMALL = {
@@ -321,3 +322,29 @@ def test_finalists_are_simulated_beside_others_and_saved(surrogate, tmp_path):
     again = read_mould(folder / "moulds" / "d01.geojson")
     assert again.outline.equals(found.moulds[0].outline)
     assert len(json.loads((folder / "designs.geojson").read_text())["features"]) == 2
+
+
+def test_the_command_says_what_is_wrong_before_it_searches(tmp_path):
+    path, file = tmp_path / "spec.yaml", tmp_path / "file"
+    path.write_text("tissue: glial_1\nobjectives: [{measure: algnment}]\n")
+    done = command_line("design", path, "--output", tmp_path / "found")
+    assert done.returncode == 1
+    assert "objectives.0: measure is 'algnment'; known are alignment" in done.stderr
+    path.write_text("tissue: glial_1\nobjectives: [{measure: alignment}]\n")
+    file.touch()
+    done = command_line("design", path, "--output", file)
+    assert f"{file} is a file; give the name of a folder" in done.stderr
+    done = command_line("design", path, "--output", tmp_path / "found", "--evaluations", 3)
+    assert "search.population is 100, above search.evaluations (3)" in done.stderr
+    assert not (tmp_path / "found").exists()
+
+
+def test_the_command_searches_and_draws(tmp_path, surrogate):
+    path, folder = tmp_path / "spec.yaml", tmp_path / "found"
+    path.write_text(json.dumps(SMALL | {"mould_cells": [3000, 4500]}))
+    done = command_line("design", path, "--output", folder, "--evaluations", 32, "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert "best alignment, predicted: searched" in done.stdout
+    assert f"next: raptor simulate {folder / 'moulds' / 'd0'}" in done.stderr
+    assert (folder / "front.png").read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in folder.glob("*.csv")} == {"designs.csv", "front.csv", "progress.csv"}

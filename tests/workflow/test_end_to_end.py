@@ -15,6 +15,7 @@ from safetensors.numpy import load_file
 from raptor.core.jobs import hold_lock
 from raptor.dataset.check import check
 from raptor.dataset.compare import differences
+from raptor.moulds import read_moulds
 from raptor.symmetry import FIELDS
 from tests.workflow.place import ENVIRONMENT, variant
 
@@ -55,6 +56,16 @@ def test_the_campaigns_are_sound_and_open_with_xarray(results):
         assert made == {
             "design.csv", "moulds.geojson", "shards", "fields.nc", "examples.csv", "card.md", "checked.txt",
         }  # fmt: skip
+
+
+def test_a_search_finds_moulds_and_simulates_them(results):
+    folder = results / "searches" / "aligned"
+    table = pd.read_csv(folder / "designs.csv")
+    assert set(table["group"]) == {"searched"}
+    assert table[["predicted_alignment", "simulated_alignment"]].abs().le(1).all(axis=None)
+    moulds = read_moulds(folder / "designs.geojson")
+    assert [mould.name for mould in moulds] == table["design"].tolist()
+    assert {path.name for path in folder.glob("moulds/d01.*")} == {"d01.geojson", "d01.svg", "d01.dxf"}
 
 
 def test_every_file_says_what_it_is(results):

@@ -1,5 +1,6 @@
 """raptor design: search for moulds whose tissues do what is wanted."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -55,4 +56,5 @@ def design(
     save(designs_figure(found), output / "moulds_found")
     typer.echo(f"{output}: {found}")
     best = output / "moulds" / f"{found.best}.geojson"
-    typer.echo(f"next: raptor predict {opt.quote(best)} --output tissue.nc", err=True)
+    cells = " ".join(f"--{name.replace('_', '-')} {v:g}" for name, v in asdict(wanted.parameters).items())
+    typer.echo(f"next: raptor simulate {opt.quote(best)} {cells} --output tissue.nc", err=True)

@@ -87,6 +87,7 @@ def parsed(path):
 def variant(folder, **changes):
     """The tiny configuration with other values, keys given as block__key, as a file in a folder."""
     content = yaml.safe_load(TINY.read_text())
+    content["searches"] = {name: str(TINY.parent / path) for name, path in content["searches"].items()}
     for key, value in changes.items():
         block, _, name = key.partition("__")
         if name:

@@ -24,8 +24,9 @@ TRADEOFF = {"measure_tradeoff", "tabulate_tradeoff", "plot_folding"}
 FITS = {"fit_tissue", "fit_by_simulator", "infer_parameters", "fit_outline", "tabulate_fits"}
 REPORT = {"record_configuration", "write_report", "report", "all"}
 EVERYTHING = (
-    CHAIN | TRAINING | EVALUATION | SWEEPS | TRADEOFF | FITS | REPORT | {"plot_tables", "plot_fields"}
-)
+    CHAIN | TRAINING | EVALUATION | SWEEPS | TRADEOFF | FITS | REPORT
+    | {"plot_tables", "plot_fields", "search_moulds"}
+)  # fmt: skip
 
 
 def test_an_empty_folder_needs_everything(workplace):
@@ -117,7 +118,7 @@ def test_a_further_campaign_leaves_the_others_alone(place, tmp_path):
         ("campaigns", CHAIN, EVALUATION | FITS),
         ("train", TRAINING, EVALUATION | FITS),
         ("evaluate", EVALUATION - {"predict_samples"}, FITS | SWEEPS),
-        ("studies", SWEEPS | {"plot_tables", "plot_fields"}, FITS | EVALUATION),
+        ("studies", SWEEPS | {"plot_tables", "plot_fields", "search_moulds"}, FITS | EVALUATION),
         ("fit", FITS, SWEEPS),
         ("tradeoff", TRADEOFF | {"plot_tables"}, FITS | SWEEPS),
         ("figures", {"predict_samples", "plot_tables", "plot_fields", "plot_folding"}, {"ship_model"}),
@@ -134,7 +135,9 @@ def test_a_target_makes_its_part(workplace, target, needed, not_needed):
 def test_parts_that_are_not_asked_for_are_left_out(workplace, tmp_path):
     content = yaml.safe_load(TINY.read_text())
     campaigns = {"paper": content["campaigns"]["paper"]}
-    changes = {"campaigns": campaigns, "models": {}, "tradeoff": {"cases": {}}, "fit": {"joint": []}}
+    changes = {"campaigns": campaigns, "models": {}, "tradeoff": {"cases": {}}, "fit": {"joint": []}} | {
+        "searches": {}
+    }
     jobs = workplace("plain").jobs(configuration=variant(tmp_path, **changes))
     assert jobs == CHAIN | REPORT | {"plot_tables"}
 

@@ -72,7 +72,6 @@ def designs_figure(found: "Designs") -> Figure:
     for axes in grid:
         axes.axis("off")
     for axes, mould, (_, row) in zip(grid, moulds, found.table.iterrows(), strict=False):
-        axes.axis("on")
         draw_mould(axes, mould)
         said = [str(row["design"]).replace("_", " ")]
         for each in found.spec.objectives:

@@ -119,8 +119,8 @@ class Configuration(Block):
             self._check_campaign(name, campaign)
         for name, model in self.models.items():
             self._check_model(name, model)
-        if self.searches and not self.models:
-            raise ValueError("searches need a surrogate; give models, or no searches")
+        if self.searches and not self.has_surrogate:
+            raise ValueError("searches need a surrogate; give models or trained_model, or no searches")
         self._order()
         for pixels in self.tradeoff.rasters:
             if max(pixels, self.pixels) % min(pixels, self.pixels):

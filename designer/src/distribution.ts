@@ -32,14 +32,18 @@ function principalAxes(mask: Uint8Array, model: Model): [number, number] {
   return [Math.max(1e-3, Math.sqrt(Math.max(0, middle - apart))), Math.max(1e-3, Math.sqrt(middle + apart))];
 }
 
-const trained = new WeakMap<Model, { low: number[]; high: number[]; deviation: number[] }>();
+const trained = new WeakMap<Model, { points: number[][]; low: number[]; high: number[]; deviation: number[] }>();
 
 function training(model: Model) {
   let found = trained.get(model);
   if (!found) {
-    const columns = model.descriptors.map((_, k) => model.calibration.points.map((point) => point[k]));
+    const bytes = Uint8Array.from(atob(model.calibration.points), (letter) => letter.charCodeAt(0));
+    const numbers = Array.from(new Float32Array(bytes.buffer)), width = model.descriptors.length;
+    const points = Array.from({ length: numbers.length / width }, (_, i) => numbers.slice(i * width, (i + 1) * width));
+    const columns = model.descriptors.map((_, k) => points.map((point) => point[k]));
     const mean = columns.map((column) => column.reduce((sum, v) => sum + v, 0) / column.length);
     found = {
+      points,
       low: columns.map((column) => column.reduce((a, b) => Math.min(a, b))),
       high: columns.map((column) => column.reduce((a, b) => Math.max(a, b))),
       deviation: columns.map((column, k) => Math.sqrt(column.reduce((sum, v) => sum + (v - mean[k]) ** 2, 0) / column.length) + 1e-6),
@@ -51,9 +55,9 @@ function training(model: Model) {
 
 /** Distance to the nearest training sample over the usual one, and what is most unusual, in words. */
 export function unusual(point: number[], model: Model): { distance: number; words: string } {
-  const { low, high, deviation } = training(model);
-  let least = Infinity, nearest = model.calibration.points[0];
-  for (const other of model.calibration.points) {
+  const { points, low, high, deviation } = training(model);
+  let least = Infinity, nearest = points[0];
+  for (const other of points) {
     let square = 0;
     for (let k = 0; k < point.length; k++) square += ((point[k] - other[k]) / deviation[k]) ** 2;
     if (square < least) { least = square; nearest = other; }

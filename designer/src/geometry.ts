@@ -97,33 +97,42 @@ function convexHull(ring: Ring): Ring {
   return [...half(points), ...half(points.reverse())];
 }
 
-/** Centre of the rectangle of least area around a ring, and half of its long side. */
+/** Distance of a point from the line through two others, positive on its right. */
+const fromLine = (p: Point, a: Point, b: Point) => {
+  const dx = b[0] - a[0], dy = b[1] - a[1], square = dx * dx + dy * dy;
+  return (((a[1] - p[1]) * dx - (a[0] - p[0]) * dy) / square) * Math.sqrt(square);
+};
+
+/**
+ * Centre of the rectangle of least area around a ring, and half of its long side.
+ *
+ * Regular shapes have several; which one is taken is left to rounding, in the order of edges and of operations
+ * that GEOS has, so that the same one is taken here as in the package.
+ */
 export function longAxis(ring: Ring): { centre: Point; half: Point } {
-  const hull = convexHull(ring);
-  let best = { area: Infinity, centre: [0, 0] as Point, sides: [] as Point[] };
-  for (let i = 0; i < hull.length; i++) {
-    const a = hull[i], b = hull[(i + 1) % hull.length];
-    const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
-    const u: Point = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-    let s0 = Infinity, s1 = -Infinity, t0 = Infinity, t1 = -Infinity;
-    for (const [x, y] of hull) {
-      const s = x * u[0] + y * u[1], t = y * u[0] - x * u[1];
-      s0 = Math.min(s0, s); s1 = Math.max(s1, s);
-      t0 = Math.min(t0, t); t1 = Math.max(t1, t);
-    }
-    const size = (s1 - s0) * (t1 - t0);
-    if (size < best.area * (1 - 1e-12)) {
-      const s = (s0 + s1) / 2, t = (t0 + t1) / 2;
-      const sides: Point[] = [[u[0] * (s1 - s0), u[1] * (s1 - s0)], [-u[1] * (t1 - t0), u[0] * (t1 - t0)]];
-      best = { area: size, centre: [s * u[0] - t * u[1], s * u[1] + t * u[0]], sides };
-    }
-  }
-  const [first, second] = best.sides;
-  const lengths = [Math.hypot(...first), Math.hypot(...second)];
+  const hull = convexHull(ring).reverse(); // clockwise, from the lowest corner
+  const start = hull.reduce((low, p, i) => (p[1] < hull[low][1] || (p[1] === hull[low][1] && p[0] < hull[low][0]) ? i : low), 0);
+  const corners = [...hull.slice(start), ...hull.slice(0, start)];
+  let best = Infinity, sides: Point[] = [], centre: Point = [0, 0];
+  corners.forEach((a, i) => {
+    const b = corners[(i + 1) % corners.length], dx = b[0] - a[0], dy = b[1] - a[1], square = dx * dx + dy * dy;
+    const top = corners.reduce((far, p) => (Math.abs(fromLine(p, a, b)) > Math.abs(fromLine(far, a, b)) ? p : far));
+    const along = ((top[0] - a[0]) * dx + (top[1] - a[1]) * dy) / square, foot: Point = [a[0] + along * dx, a[1] + along * dy];
+    const across = corners.map((p) => fromLine(p, foot, top)), most = Math.max(...across), least = Math.min(...across);
+    const height = Math.hypot(top[0] - foot[0], top[1] - foot[1]), size = height * (Math.abs(most) + Math.abs(least));
+    if (size >= best) return;
+    best = size;
+    const u: Point = [dx / Math.sqrt(square), dy / Math.sqrt(square)], v: Point = [(top[0] - foot[0]) / height, (top[1] - foot[1]) / height];
+    const places = corners.map((p) => (p[0] - foot[0]) * u[0] + (p[1] - foot[1]) * u[1]), s0 = Math.min(...places), s1 = Math.max(...places);
+    sides = [[u[0] * (s1 - s0), u[1] * (s1 - s0)], [top[0] - foot[0], top[1] - foot[1]]];
+    const s = (s0 + s1) / 2;
+    centre = [foot[0] + s * u[0] + (height / 2) * v[0], foot[1] + s * u[1] + (height / 2) * v[1]];
+  });
+  const [first, second] = sides, lengths = [Math.hypot(...first), Math.hypot(...second)];
   const equal = Math.abs(lengths[0] - lengths[1]) <= 1e-8 + 1e-6 * lengths[1];
   const long = equal ? Math.abs(second[0]) > Math.abs(first[0]) : lengths[1] > lengths[0];
   const side = long ? second : first;
-  return { centre: best.centre, half: [side[0] / 2, side[1] / 2] };
+  return { centre, half: [side[0] / 2, side[1] / 2] };
 }
 
 /** Whether no circle of a radius fits into a region given by its rings (outer, then holes), to a precision. */

@@ -233,7 +233,7 @@ function showSamples(): void {
     const drawn = new Picture(model, result!.found, each.fields, each.numbers.held, shown(result!.found, each.fields, fieldName(), model));
     const context = fit(small, 104, 66);
     context.scale(0.2, 0.2);
-    paint(context, { ...scene(), picture: drawn, view: fitted(design.mould, 520, 330), withDirectors: false, isStale: false }, 520, 330, model);
+    paint(context, { ...scene(), picture: drawn, view: fitted(design.mould, 520, 330), withDirectors: false, isStale: false, isPlain: true }, 520, 330, model);
     button.addEventListener("click", () => { sample = i; redraw(); });
     return button;
   }));

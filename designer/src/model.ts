@@ -36,7 +36,7 @@ export interface Model {
     ratios: ErrorScale;
     usual_disagreement: number;
     usual_distance: number;
-    points: number[][];
+    points: string; // of the training set, float32 in base64, a row of descriptors each
   };
   descriptors: { name: string; words: string; unit: string }[];
   bounds: Record<keyof Cells, Bounds>;

@@ -14,6 +14,7 @@ export interface Scene {
   picture: Picture | null;
   view: View;
   withDirectors: boolean;
+  isPlain?: boolean; // without scales
   isStale: boolean; // the mould is no longer the one predicted
 }
 
@@ -89,6 +90,7 @@ export function paint(context: CanvasRenderingContext2D, scene: Scene, width: nu
   context.stroke(traced(mould.outline));
   mould.tethers.forEach((tether, i) => drawTether(context, tether, i, !scene.isStale && picture ? picture.held[i] < 0.5 : false, pixel));
   context.restore();
+  if (scene.isPlain) return;
   drawScale(context, scene, scale, height);
   if (picture) drawColours(context, picture.shown, width, height, model);
 }

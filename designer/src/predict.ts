@@ -104,14 +104,15 @@ export class Predictor {
       samples.push({ fields, numbers: this.numbers(fields, cast) });
     }
     const all = samples.map((sample) => sample.numbers), first = samples[0];
-    const average = (of: (each: Numbers) => number) => all.reduce((sum, each) => sum + of(each), 0) / all.length;
+    const known = (of: (each: Numbers) => number) => all.map(of).filter((value) => !Number.isNaN(value));
+    const average = (of: (each: Numbers) => number) => known(of).reduce((sum, value) => sum + value, 0) / known(of).length;
     const numbers: Numbers = {
       ...first.numbers,
       ratios: [average((each) => each.ratios[0]), average((each) => each.ratios[1])],
       alignment: average((each) => each.alignment),
       anisotropy: average((each) => each.anisotropy),
       held: first.numbers.held.map((_, k) => average((each) => each.held[k])),
-      bands: job.whole ? ([0, 1].map((k) => 1.96 * spread(all.map((each) => each.ratios[k]))) as [number, number]) : null,
+      bands: job.whole ? ([0, 1].map((k) => 1.96 * spread(known((each) => each.ratios[k]))) as [number, number]) : null,
     };
     return { fields: first.fields, deviation: null, samples: job.whole ? samples : [], numbers };
   }

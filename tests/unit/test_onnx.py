@@ -43,10 +43,8 @@ def images(architecture, count=3):
     return inputs, torch.full((count,), 500.0)
 
 
-@pytest.mark.parametrize("kind", ["shipped", "film_unet with noise", "pix2pix"])
-def test_networks_answer_as_in_torch(kind):
-    surrogate = raptor.load_surrogate() if kind == "shipped" else untrained(*kind_of(kind))
-    exported = export_networks(surrogate)
+def assert_same(surrogate, exported):
+    """Whether the networks of a surrogate answer alike in ONNX and in torch."""
     inputs, cells = images(surrogate.architecture)
     feeds = {"inputs": inputs, "cells": cells}
     if surrogate.architecture.noise:
@@ -57,14 +55,17 @@ def test_networks_answer_as_in_torch(kind):
         assert np.abs(answer(exported.model(number), **feeds) - expected).max() < 1e-4
 
 
-def kind_of(kind):
-    return kind.split()[0], 4 if "noise" in kind else 0
+def test_the_shipped_networks_answer_as_in_torch():
+    surrogate = raptor.load_surrogate()
+    assert_same(surrogate, export_networks(surrogate))
 
 
-def test_images_are_refined_as_in_torch():
-    fine = torch.rand(3, 64, 64)
-    coarse = block_average(fine, 32)
-    refined = answer(export_networks(untrained("pix2pix")).refine, images=coarse)
+def test_a_network_that_samples_answers_as_in_torch_and_its_images_are_refined():
+    surrogate = untrained("film_unet", noise=4)
+    exported = export_networks(surrogate)
+    assert_same(surrogate, exported)
+    coarse = block_average(torch.rand(3, 64, 64), 32)
+    refined = answer(exported.refine, images=coarse)
     assert np.abs(refined - deconvolve(coarse, 64).numpy()).max() < 1e-4
 
 

@@ -107,7 +107,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
             "this model's errors were not calibrated, so the page could give no bands; use a model written "
             "by the workflow's rule assemble_model"
         )
-    points = np.asarray(calibration.training.points, np.float64)
+    points = base64.b64encode(np.ascontiguousarray(calibration.training.points, "<f4")).decode("ascii")
     descriptors = [
         {"name": name, "words": found.words, "unit": found.unit} for name, found in DESCRIPTORS.items()
     ]
@@ -124,7 +124,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "cast_threshold": density_threshold(surrogate.layers, surrogate.pixels),
         "fields": FIELDS,
         "scaling": {"offset": surrogate.scaling.offset, "scale": surrogate.scaling.scale},
-        "calibration": calibration.as_json() | {"points": points.round(6).tolist()},
+        "calibration": calibration.as_json() | {"points": points},
         "descriptors": descriptors,
         "bounds": {name: {"lower": box.lower, "upper": box.upper} for name, box in BOUNDS.items()},
         "constants": CONSTANTS,

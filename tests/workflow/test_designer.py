@@ -4,6 +4,7 @@ import gzip
 import json
 import shutil
 import subprocess
+from dataclasses import asdict
 
 import pytest
 
@@ -41,8 +42,10 @@ def shown(browser):
     return json.loads(browser.wait("raptor.numbers && JSON.stringify(raptor.numbers)", 120))
 
 
-def adopt(browser, **design):
-    browser.value(f"raptor.adopt({json.dumps(design)})")
+def start(browser, mould):
+    """The numbers of a mould of the library with `CELLS`."""
+    browser.value(f"raptor.adopt({{cells: {json.dumps(asdict(CELLS))}}})")
+    browser.value(f"raptor.preset('{mould}')")
     return shown(browser)
 
 
@@ -68,17 +71,13 @@ def test_it_opens_without_a_network_or_an_error(page, browser):
 
 
 def test_numbers_equal_those_of_the_command(browser):
-    cells = {"delta": CELLS.delta, "kappa_nnn": CELLS.kappa_nnn, "kappa_nnnn": CELLS.kappa_nnnn}
-    browser.value(f"raptor.adopt({{cells: {json.dumps(cells)}}})")
     for name in MOULDS:
-        browser.value(f"raptor.preset('{name}')")
-        assert_same(shown(browser), raptor.predict(name, CELLS))
+        assert_same(start(browser, name), raptor.predict(name, CELLS))
     assert browser.said == []
 
 
 def test_a_dragged_post_changes_the_numbers_and_an_exported_mould_keeps_them(browser, tmp_path):
-    browser.value("raptor.preset('four_post_rectangle')")
-    before = shown(browser)
+    before = start(browser, "four_post_rectangle")
     post = browser.value("raptor.design.mould.tethers[0]")
     x, y = post["x"], post["y"]
     places = [browser.value(f"raptor.toScreen({x * share}, {y * share})") for share in (1, 0.6)]
@@ -102,7 +101,7 @@ def test_a_dragged_post_changes_the_numbers_and_an_exported_mould_keeps_them(bro
 
 
 def test_symmetry_undo_and_what_cannot_be_cast(browser):
-    browser.value("raptor.preset('four_post_rectangle')")
+    start(browser, "four_post_rectangle")
     browser.value("document.getElementById('symmetry').value = 'both'")
     browser.value("document.getElementById('symmetry').dispatchEvent(new Event('change'))")
     drawn = browser.value("raptor.design.mould")

@@ -107,7 +107,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
             "this model's errors were not calibrated, so the page could give no bands; use a model written "
             "by the workflow's rule assemble_model"
         )
-    points = base64.b64encode(np.ascontiguousarray(calibration.training.points, "<f4")).decode("ascii")
+    points = base64.b64encode(np.asarray(calibration.training.points, "<f4").tobytes()).decode("ascii")
     descriptors = [
         {"name": name, "words": found.words, "unit": found.unit} for name, found in DESCRIPTORS.items()
     ]

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
@@ -181,7 +182,8 @@ def mould_figure(mould: Mould, rows: Mapping[str, str], like: Mould | None = Non
     axes.text(-HALF + 7, -HALF + 2.8, "10 $l_0$", ha="center", va="bottom")
     axes.spines[:].set_visible(True)  # the frame is part of the model's input
     width = max(len(name) for name in rows)
-    table = [f"{name:>{width}}  {value}" for name, value in rows.items()]
+    indent = "\n" + (width + 2) * " "
+    table = [f"{name:>{width}}  {indent.join(wrap(value, 50))}" for name, value in rows.items()]
     axes.set_title("\n".join(table), loc="left", family="monospace", fontsize=8)
     return figure
 

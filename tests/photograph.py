@@ -4,7 +4,7 @@
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +12,10 @@ import shapely
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 from skimage import io
 
+from raptor.core.errors import RaptorError
 from raptor.fields.shape import outline_ratios
 from raptor.imaging import Registration, as_picture, measure, register
 from raptor.moulds import read_mould
@@ -38,6 +39,10 @@ class Camera:
     post: float = 0.5
     texture: float = 0.05
     wall: float = 0.0  # width of a dark band around the rim, l0
+    shadow: float = 0.0  # how much of the light a post's shadow takes; it lies 1.5 l0 to one side
+    meniscus: float = 0.0  # brightness that the medium's curved edge adds, falling over 1 l0 from the rim
+    glare: float = 0.0  # brightness of a lamp's reflection 4 l0 wide, over the plate's
+    tint: float = 0.0  # how much of the light a coloured medium takes from the whole depression
 
     @property
     def registration(self):
@@ -75,9 +80,25 @@ def photograph(mould, tissue, camera, seed=0):
     layers = [(mould.outline, camera.floor), (tissue.intersection(mould.outline), cloth)]
     for shape, brightness in [*layers, *((tether.polygon, camera.post) for tether in mould.tethers)]:
         scene += coverage(shape, camera) * (brightness - scene)
+    scene = real(scene, mould, camera)
     lit = camera.plate * gaussian_filter(scene, camera.blur) * uneven_light(camera, rng)
     noisy = lit + camera.noise * camera.plate * rng.normal(size=lit.shape)
     return np.round(255 * np.clip(noisy, 0, 1)).astype(np.uint8)
+
+
+def real(scene, mould, camera):
+    """The scene with what photographs of dishes show: shadows of posts, meniscus, glare, coloured medium."""
+    if not any((camera.shadow, camera.meniscus, camera.glare, camera.tint)):
+        return scene
+    posts = shapely.union_all([tether.polygon for tether in mould.tethers])
+    cast = shapely.affinity.translate(posts, 1.5, -0.7).difference(posts).intersection(mould.outline)
+    inside = coverage(mould.outline, camera)
+    scene = scene * (1 - camera.shadow * gaussian_filter(coverage(cast, camera), 0.2 * camera.scale))
+    from_rim = distance_transform_edt(inside > 0.5) / camera.scale
+    scene = scene + camera.meniscus * inside * np.exp(-from_rim)
+    scene = scene * (1 - camera.tint * inside)
+    spot = coverage(shapely.Point(3, 2).buffer(2), camera)
+    return scene + camera.glare * gaussian_filter(spot, 0.5 * camera.scale)
 
 
 def uneven_light(camera, rng):
@@ -159,6 +180,33 @@ CASES = (
 )
 
 
+KINDS = {
+    "shadow of the posts, 30 % darker": {"shadow": 0.3},
+    "shadow of the posts, 60 % darker": {"shadow": 0.6},
+    "meniscus, 20 % of the plate's brightness at the rim": {"meniscus": 0.2},
+    "meniscus, 50 %": {"meniscus": 0.5},
+    "glare, half the plate's brightness": {"glare": 0.5},
+    "glare, twice the plate's brightness, over-exposed": {"glare": 2.0},
+    "medium that takes 20 % of the light": {"tint": 0.2},
+    "medium that takes 40 %": {"tint": 0.4},
+}
+"""What real photographs show, by name, as settings of the camera."""
+
+
+def by_kind(case, number=0):
+    """Errors of A/A0 and w/w0 of a case with each of `KINDS`; the refusal's sentence where it is refused."""
+    mould, tissue, _ = case.made()
+    area, width = outline_ratios(tissue, mould)
+    for name, settings in KINDS.items():
+        picture = as_picture(photograph(mould, tissue, replace(case.camera, **settings), number), case.mould)
+        try:
+            found = measure(picture, mould, register(picture, mould, mirrored=case.camera.mirrored))
+        except RaptorError as error:
+            yield name, str(error)
+        else:
+            yield name, (found.area_ratio - area, found.width_ratio - width)
+
+
 def main(folder):
     """Write the set; print truth and error of A/A0 and w/w0."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -173,6 +221,10 @@ def main(folder):
             f"| {found.area_ratio - area:+.4f} | {found.width_ratio - width:+.4f} "
             f"| {found.registration.residual:.3f} | {found.contrast:.1f} |\n"
         )
+    for case in CASES[:3]:
+        for name, errors in by_kind(case):
+            said = errors if isinstance(errors, str) else "{:+.4f} | {:+.4f}".format(*errors)
+            sys.stdout.write(f"| {case.mould} | {name} | {said} |\n")
 
 
 if __name__ == "__main__":

@@ -44,7 +44,13 @@ def main(folder, count):
         stem = folder / f"{number:02d}_{mould.name}"
         io.imsave(stem.with_suffix(".png"), pixels, check_contrast=False)
         started = perf_counter()
-        photo = raptor.measure(stem.with_suffix(".png"), mould)
+        try:
+            photo = raptor.measure(stem.with_suffix(".png"), mould)
+        except raptor.MeasurementError as refused:
+            sys.stdout.write(
+                f"| {number} {mould.name} | {tissue.parameters.delta:.3f} | refused: {refused} |\n"
+            )
+            continue
         fit = raptor.fit(mould, photo.area_ratio, photo.width_ratio)
         seconds = perf_counter() - started
         raptor.plot(fit, photograph=photo).savefig(folder / f"{stem.name}_fit.png")

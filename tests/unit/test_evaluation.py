@@ -1,7 +1,7 @@
 """Bands hold their share, flags fire, and the noise floor is what it says."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -29,7 +29,8 @@ from raptor.moulds.cast import CastMould
 from raptor.raster import density_threshold
 from raptor.studies.active_learning import disagreement_of
 from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
-from raptor.surrogate.bands import LEVELS, Bands, fit_scale
+from raptor.studies.scores import summary_of
+from raptor.surrogate.bands import LEVELS, MEASURED, Bands, fit_scale
 from raptor.surrogate.baselines import Nearest, baseline, training_mean
 from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.calibration import Case, calibrate, fit_threshold
@@ -122,6 +123,17 @@ def test_what_is_unusual_is_named_with_its_value_and_the_range_that_was_trained_
     assert re.fullmatch(r"Delta 0.815 with all else as it is; the nearest .* has 0\.\d+", told)
 
 
+@dataclass(frozen=True)
+class Image:
+    """A mean in place of `Realisations`."""
+
+    density: np.ndarray
+    cast: CastMould
+
+    def of_mean(self, threshold):
+        return np.array([*shape_ratios(self.density, self.cast, threshold), 0, 0])
+
+
 def test_the_threshold_of_softer_images_is_found():
     """Blurred tissues that fill less and less of a mould, at a threshold below half of their density."""
     mould = Mould(shapely.box(-20, -10, 20, 10))
@@ -131,14 +143,13 @@ def test_the_threshold_of_softer_images_is_found():
     for part in (0.5, 0.6, 0.7, 0.8):
         sharp = 1 / (1 + np.exp(4 * np.maximum(np.abs(x) - 20 * part, np.abs(y) - 10 * part)))
         soft = gaussian_filter(sharp, 3.0)
-        true = shape_ratios(sharp, cast, 0.3)
-        cases.append(Case(cast, true, soft, soft[None]))
+        true = np.array([*shape_ratios(sharp, cast, 0.3), 0, 0])
+        cases.append(Case(true, Image(soft, cast)))
     factor = fit_threshold(cases, 0.3)
     assert factor > 1.02
-    before, after = (np.mean([np.abs(c.error(f * 0.3)) for c in cases]) for f in (1.0, factor))
+    before, after = (np.mean([np.abs(c.error_of_mean(f * 0.3)[:2]) for c in cases]) for f in (1.0, factor))
     assert after < 0.5 * before
-    assert (cases[0].deviation(0.3) == 0).all()
-    same = [replace(c, ratios=shape_ratios(c.density, cast, 0.3)) for c in cases]
+    same = [replace(c, simulated=c.found.of_mean(0.3)) for c in cases]
     assert fit_threshold(same, 0.3) == pytest.approx(1, abs=5e-3)
 
 
@@ -148,7 +159,7 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
     prediction = surrogate.examine(mould, sample.parameters)
     assert prediction.values.shape == (8, 32, 32)
     assert prediction.field_bands.half.shape == (3, 8, 32, 32)
-    assert prediction.ratio_bands.half.shape == (3, 2)
+    assert prediction.measure_bands.half.shape == (3, 4)
     assert np.allclose(prediction.values, surrogate.predict(mould, [sample.parameters])[0], atol=1e-5)
     for half in (False, True):
         folder = tmp_path / f"{half}"
@@ -156,7 +167,7 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
         again = load(folder).examine(mould, sample.parameters)
         near = 5e-3 if half else 1e-6
         assert np.abs(again.values - prediction.values).max() < near * np.abs(prediction.values).max()
-        assert again.ratio_bands.half == pytest.approx(prediction.ratio_bands.half, rel=0.05)
+        assert again.measure_bands.half == pytest.approx(prediction.measure_bands.half, rel=0.05)
         assert again.distance == pytest.approx(prediction.distance)
         assert again.threshold == pytest.approx(prediction.threshold)
     assert prediction.threshold != pytest.approx(density_threshold(2, 32), rel=1e-3)
@@ -174,8 +185,11 @@ def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
     summary = summarise(metrics)
     assert summary["fields"]["density"]["vrmse"] == pytest.approx(metrics["vrmse_density"].mean())
     assert set(summary["coverage"]) == {
-        f"cover{level}_{name}" for level in (50, 80, 95) for name in (*FIELDS, "area_ratio", "width_ratio")
+        f"cover{level}_{name}" for level in (50, 80, 95) for name in (*FIELDS, *MEASURED)
     }
+    scores = summary["scores"]
+    assert scores["crps_density"] == pytest.approx(metrics["crps_density"].mean())
+    assert 0 <= scores["brier"] <= 1
     regions = by_region(metrics).set_index("region")
     assert regions.loc["all", "samples"] == 2
     below = int((metrics["delta"] < 0.3).sum())
@@ -183,6 +197,24 @@ def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
     costs = costs_of(surrogate, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]}))
     assert costs["training_core_minutes"] == pytest.approx(1.0)
     assert costs["all_ms"] > 0
+
+
+def test_scores_tell_samples_of_the_truth_from_others():
+    """Answers drawn as the truth is have the spread of their error, and its chance beats the base rate."""
+    rng, rows = np.random.default_rng(0), []
+    for chance in rng.random(200):
+        answers, truth = rng.normal(size=(16, 50)), rng.normal(size=50)
+        held = float(rng.random() < chance)
+        rows.append({
+            "crps_density": 0.0, "spread": answers.var(axis=0, ddof=1).mean() * (1 + 1 / 16),
+            "skill": ((answers.mean(axis=0) - truth) ** 2).mean(), "brier": (chance - held) ** 2,
+            "seen_held": held, "seen": 1.0, "vrmse_density": chance,
+            "distance": chance**2, "disagreement": 0.0,
+        })  # fmt: skip
+    found = summary_of(pd.DataFrame(rows))
+    assert found["spread_over_skill"] == pytest.approx(1, abs=0.05)
+    assert found["brier"] < found["brier_of_base_rate"]
+    assert found["flag_auc"] == 1
 
 
 def test_the_noise_floor_is_the_error_of_the_mean_of_many_runs(made, stack, moulds, tmp_path):

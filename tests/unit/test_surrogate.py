@@ -11,10 +11,12 @@ from raptor.core.errors import RaptorError
 from raptor.dataset.examples import list_examples, training_scaling
 from raptor.dataset.scaling import Scaling
 from raptor.dataset.stack import read_table
+from raptor.fields.shape import shape_ratios
 from raptor.moulds import Mould
 from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters
 from raptor.surrogate.batches import ExampleSet, split_examples
+from raptor.surrogate.ensemble import full_density
 from raptor.surrogate.files import load, save
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
@@ -226,6 +228,14 @@ def test_samples_are_outcomes_of_their_own(model_folder):
             if isinstance(module, FilmNorm):
                 torch.nn.init.normal_(module.modulation.weight, 0.0, 0.1)
     surrogate = Surrogate(members, architecture, SCALING, 4, 32)
+    found = surrogate.ensemble(BOX, CellParameters(0.5, 0.5, 0.3)).realisations
+    densities = full_density(found.densities[1:], found.cast)
+    threshold = float(densities.max()) / 4  # these untrained networks spread cells thinly
+    estimate, deviations = found.estimate(threshold)
+    each = [shape_ratios(density, found.cast, threshold) for density in densities]
+    assert len(each) == 2 * 8
+    assert estimate[:2] == pytest.approx(np.mean(each, axis=0))
+    assert deviations[:2] == pytest.approx(np.std(each, axis=0, ddof=1))
     samples = surrogate.sample(BOX, CellParameters(0.5, 0.5, 0.3), 5, seed=3)
     assert samples.shape == (5, 8, 32, 32)
     assert np.array_equal(samples, surrogate.sample(BOX, CellParameters(0.5, 0.5, 0.3), 5, seed=3))

@@ -31,7 +31,8 @@ with logged(snakemake.log[0]):
     data += [(begun / "model.json").read_text(encoding="utf-8")] if begun else []
     identity = content_hash([params.identity, params.seed, *data])
     runs = {name: len(training_rows(stack, fraction)) for name, stack in zip(campaigns, stacks, strict=True)}
-    examples, splits = join_examples(stacks, [read_examples(path) for path in files], fraction)
+    listed = [read_examples(path) for path in files]
+    examples, splits = join_examples(stacks, listed, fraction, every_image=rules.noise > 0)
     with progress("training", rules.epochs) as advance:
         trained = train(
             *split_examples(stacks, examples, splits, scaling, architecture.pixels),

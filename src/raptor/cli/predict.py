@@ -1,8 +1,18 @@
 """raptor predict: one tissue by a trained surrogate, with error bands."""
 
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
 import raptor
 from raptor.cli import options as opt
 from raptor.core.jobs import progress
+
+Samples = Annotated[
+    int,
+    typer.Option(min=0, max=16, help="possible tissues to write too, of a surrogate that samples"),
+]
 
 
 def predict(
@@ -19,6 +29,7 @@ def predict(
     page: opt.Page = None,
     picture: opt.Picture = None,
     fields: opt.Fields = False,
+    samples: Samples = 0,
     as_json: opt.Json = False,
 ) -> None:
     """Predict the tissue of a mould by a trained surrogate, with 50, 80 and 95 % bands.
@@ -35,7 +46,10 @@ def predict(
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)
     with progress("prediction", None):
-        found = raptor.predict(shape, cells, model)
+        surrogate = raptor.load_surrogate(model)
+        if samples:
+            surrogate.require_samples()
+        found = replace(raptor.predict(shape, cells, surrogate), kept=samples)
     point = f"--delta {cells.delta:g} --kappa-nnn {cells.kappa_nnn:g} --kappa-nnnn {cells.kappa_nnnn:g}"
     then = (
         f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} {point} --output simulated.nc"

@@ -56,23 +56,32 @@ def training_rows(stack: Path, fraction: float = 1.0) -> list[int]:
 
 
 def join_examples(
-    stacks: Sequence[Path], examples: Sequence[list[Example]], fraction: float = 1.0
+    stacks: Sequence[Path],
+    examples: Sequence[list[Example]],
+    fraction: float = 1.0,
+    *,
+    every_image: bool = False,
 ) -> tuple[list[Example], list[str]]:
     """Examples of several stacks as one list, and the splits of all their samples.
 
     Rows are numbered consecutively through the stacks, as in `ExampleSet`. Of each stack: the examples of
     `training_rows` and of the validation split.
+
+    Parameters
+    ----------
+    every_image : bool
+        Add the images of a symmetric mould that repeat it: the mould repeats, the tissue in it does not.
     """
     joined: list[Example] = []
     splits: list[str] = []
     for stack, listed in zip(stacks, examples, strict=True):
         table = read_table(stack)
         used = {*training_rows(stack, fraction), *table.rows("validation")}
-        joined += [
-            replace(example, sample=len(splits) + example.sample)
-            for example in listed
-            if example.sample in used
-        ]
+        chosen = [example for example in listed if example.sample in used]
+        if every_image:
+            rows = dict.fromkeys(example.sample for example in chosen)
+            chosen = [Example(row, element) for row in rows for element in range(len(Element.all()))]
+        joined += [replace(example, sample=len(splits) + example.sample) for example in chosen]
         splits += table.split
     return joined, splits
 

@@ -39,7 +39,7 @@ MEASURES = {
 """Numbers of a tissue."""
 
 TETHER_MEASURES = {
-    "held": "share of layers in which tissue encircles the tether",
+    "held": "share of layers in which tissue encircles the tether; of a prediction, the chance that it does",
     "contact": "share of the rim of the tether with a cell within 1.5 l0",
 }
 """Numbers of each tether; `held` is NaN for a tether that touches the outline."""

@@ -146,7 +146,7 @@ def survey(
     bands, values = [], []
     for point in parameters[:BANDED]:
         examined = surrogate.examine(cast, point)
-        bands.append(examined.ratio_bands.half[level])
+        bands.append(examined.measure_bands.half[level, :2])
         values.append(seen(examined.values, cast, surrogate.threshold))
         on_progress(f"{len(values)} of {points} predictions over the region")
     for start in range(BANDED, points, TOGETHER):

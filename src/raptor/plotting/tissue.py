@@ -101,15 +101,15 @@ def _rows(fields: "xr.Dataset") -> dict[str, str]:
     rows = {
         "A/A0": f"{_with_band(fields, 'area_ratio')}  area over that as cast",
         "w/w0": f"{_with_band(fields, 'width_ratio')}  width across the middle over that as cast",
-        "alignment": f"{float(fields['alignment']):.2f}  with the long side: 1 along it, -1 across",
-        "anisotropy": f"{float(fields['anisotropy']):.2f}  local alignment in any direction, 0 to 1",
+        "alignment": f"{_with_band(fields, 'alignment', 2)}  with the long side: 1 along it, -1 across",
+        "anisotropy": f"{_with_band(fields, 'anisotropy', 2)}  local alignment in any direction, 0 to 1",
     }
     held = fields["held"].to_numpy() if "held" in fields.coords else np.empty(0)
     encircled = np.isfinite(held)
     if encircled.any():
         lost = _lost(fields)
         names = f"; lost: {', '.join(str(number + 1) for number in lost)}" if lost else ""
-        rows["tethers"] = f"{encircled.sum() - len(lost)} of {encircled.sum()} held{names}"
+        rows["tethers"] = f"{encircled.sum() - len(lost)} of {encircled.sum()} held{names}{_doubtful(fields)}"
         if "contact" in fields.coords:
             least = float(fields["contact"][encircled].min())
             rows["tethers"] += f"; at least {least:.0%} of a rim in contact"
@@ -127,16 +127,25 @@ def _highest_tension(
     return float(fields["x"][x]), float(fields["y"][y]), float(tension[y, x])
 
 
-def _with_band(fields: "xr.Dataset", name: str) -> str:
-    """A ratio, with the half width of its 95 % band where it has one."""
+def _with_band(fields: "xr.Dataset", name: str, digits: int = 3) -> str:
+    """A measure, with the half width of its 95 % band where it has one."""
     band = f"{name}_band"
-    half = rf" $\pm$ {float(fields[band][-1]):.3f}" if band in fields.coords else ""
-    return f"{float(fields[name]):.3f}{half}"
+    half = rf" $\pm$ {float(fields[band][-1]):.{digits}f}" if band in fields.coords else ""
+    return f"{float(fields[name]):.{digits}f}{half}"
 
 
 def _lost(fields: "xr.Dataset") -> list[int]:
     """Numbers, from 0, of the tethers that tissue does not hold."""
     return np.flatnonzero(fields["held"].to_numpy() < 0.5).tolist() if "held" in fields.coords else []
+
+
+def _doubtful(fields: "xr.Dataset") -> str:
+    """The chance of being held of the tethers for which a prediction is not sure."""
+    if fields.attrs.get("method") != "prediction":
+        return ""
+    chances = enumerate(fields["held"].to_numpy(), start=1)
+    doubts = [f"{number} by {chance:.0%}" for number, chance in chances if 0.05 < chance < 0.95]
+    return f"; chance of tether {', '.join(doubts)}" if doubts else ""
 
 
 def _draw_walls(axes: Axes, mould: Mould, lost: list[int]) -> None:

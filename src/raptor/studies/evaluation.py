@@ -18,7 +18,8 @@ from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import PARAMETERS
-from raptor.surrogate.bands import LEVELS
+from raptor.studies.scores import scores, summary_of
+from raptor.surrogate.bands import LEVELS, MEASURED
 from raptor.surrogate.prediction import Prediction
 from raptor.symmetry import FIELDS
 
@@ -122,9 +123,10 @@ def evaluate(
             measured = sample_measures(fields, cast)
             row |= {f"{name}_{source}": value for name, value in measured.items()}
         if isinstance(guess, Prediction):
-            row |= {f"{name}_predicted": float(v) for name, v in zip(SHAPES, guess.ratios, strict=True)}
+            found = zip(MEASURED, guess.measures.tolist(), strict=True)
+            row |= {f"{name}_predicted": value for name, value in found}
             row["posts_lost_predicted"] = guess.posts_lost
-            row |= _coverage(guess, sample, row)
+            row |= _coverage(guess, sample, row) | scores(guess, sample)
         rows.append(row)
         on_progress(sample.simulation)
     return pd.DataFrame(rows)
@@ -134,17 +136,17 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
     """Coverage of the bands, and the flag."""
     inside = sample.depression.astype(bool)
     held = guess.field_bands.hold(without_sign(guess.values) - without_sign(sample.fields))
-    true = np.array([row[f"{name}_simulated"] for name in SHAPES])
-    shapes = guess.ratio_bands.hold(guess.ratios - true)
+    true = np.array([row[f"{name}_simulated"] for name in MEASURED])
+    covered = guess.measure_bands.hold(guess.measures - true)
     found: dict[str, Any] = {}
     for number, level in enumerate(LEVELS):
         name = f"cover{round(100 * level)}"
         found |= {f"{name}_{f}": float(held[number, i][inside].mean()) for i, f in enumerate(FIELDS)}
-        for column, shape in enumerate(SHAPES):
+        for column, measure in enumerate(MEASURED):
             known = np.isfinite(true[column])
-            found[f"{name}_{shape}"] = float(shapes[number, column]) if known else float("nan")
-    widest = guess.ratio_bands.half[-1]
-    found |= {f"{name}_band95": float(widest[column]) for column, name in enumerate(SHAPES)}
+            found[f"{name}_{measure}"] = float(covered[number, column]) if known else float("nan")
+    widest = guess.measure_bands.half[-1].tolist()
+    found |= {f"{name}_band95": half for name, half in zip(MEASURED, widest, strict=True)}
     return found | {
         "disagreement": guess.disagreement,
         "distance": guess.distance,
@@ -210,6 +212,7 @@ def summarise(metrics: pd.DataFrame, floor: pd.DataFrame | None = None) -> dict[
         "bulk": {name: agreement(metrics, name) for name in MEASURES},
         "coverage": {column: float(metrics[column].mean()) for column in covers},
         "out_of_distribution": None if flagged is None else float(flagged.mean()),
+        "scores": {} if flagged is None else summary_of(metrics),
         "floor": None if floor is None else float(floor["vrmse_density"].mean()),
         "in_floors": {} if floor is None else in_floors(metrics, floor),
     }

@@ -76,7 +76,7 @@ def predict(
         point = (mould, parameters.delta, parameters.kappa_nnn, ratio_of(parameters))
         row: dict[str, Any] = dict(zip(POINT, point, strict=True))
         row |= dict(zip(SHAPES, predicted.ratios.tolist(), strict=True))
-        bands = predicted.ratio_bands.half[widest].tolist()
+        bands = predicted.measure_bands.half[widest, :2].tolist()
         row |= {f"{name}_band95": band for name, band in zip(SHAPES, bands, strict=True)}
         if parameters.delta in shown:
             fields[len(rows)] = predicted.values

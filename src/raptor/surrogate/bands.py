@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from raptor.surrogate.out_of_distribution import TrainingSet
 
 LEVELS = (0.5, 0.8, 0.95)
+MEASURED = ("area_ratio", "width_ratio", "alignment", "anisotropy")
+"""Measures of a tissue that are predicted with bands."""
+
 USUAL = 0.99  # share of the validation samples that are not flagged
 TINY = 1e-9
 
@@ -61,19 +64,19 @@ class Calibration:
 
     Parameters
     ----------
-    fields, ratios : ErrorScale
-        Of the eight fields, and of A/A0 and w/w0.
+    fields, measures : ErrorScale
+        Of the eight fields, and of `MEASURED`.
     usual_disagreement : float
         Of networks (`disagreement`): the value that 99 % of the validation samples stay below.
     training : TrainingSet
         The training set, to which the distance of inputs is measured.
     threshold_factor : float
-        Factor of the density above which there is tissue: predicted edges are blurred, which moves the
-        contour at the simulations' threshold outwards.
+        Factor of the density above which there is tissue in means: their edges are blurred, which moves the
+        contour at the simulations' threshold outwards. Samples are measured at that of simulations.
     """
 
     fields: ErrorScale
-    ratios: ErrorScale
+    measures: ErrorScale
     usual_disagreement: float
     training: TrainingSet
     threshold_factor: float = 1.0
@@ -87,7 +90,7 @@ class Calibration:
         return {
             "levels": LEVELS,
             "fields": asdict(self.fields),
-            "ratios": asdict(self.ratios),
+            "measures": asdict(self.measures),
             "usual_disagreement": self.usual_disagreement,
             "usual_distance": self.training.usual,
             "threshold_factor": self.threshold_factor,
@@ -96,12 +99,12 @@ class Calibration:
     @classmethod
     def from_json(cls, content: dict[str, Any], points: NDArray[np.float32]) -> "Calibration":
         """The inverse of `as_json`."""
-        fields, ratios = (
+        fields, measures = (
             ErrorScale(tuple(part["irreducible"]), tuple(tuple(row) for row in part["factors"]))
-            for part in (content["fields"], content["ratios"])
+            for part in (content["fields"], content["measures"])
         )
         training = TrainingSet(points, content["usual_distance"])
-        return cls(fields, ratios, content["usual_disagreement"], training, content["threshold_factor"])
+        return cls(fields, measures, content["usual_disagreement"], training, content["threshold_factor"])
 
 
 def disagreement(deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:

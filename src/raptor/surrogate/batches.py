@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 
@@ -80,14 +81,22 @@ class ExampleSet(Dataset[Batch]):
         )
         return torch.from_numpy(inputs), torch.from_numpy(target)
 
-    @property
-    def rows(self) -> set[int]:
-        """Rows of the stacks from which the examples are made."""
-        return {example.sample for example in self.examples}
+    @cached_property
+    def images(self) -> dict[int, list[int]]:
+        """Numbers of the examples of each sample, by its row."""
+        found: dict[int, list[int]] = {}
+        for number, example in enumerate(self.examples):
+            found.setdefault(example.sample, []).append(number)
+        return found
+
+    def shuffled(self) -> list[int]:
+        """One random example of each sample, in random order, by torch's own generator."""
+        chosen = [numbers[int(torch.randint(len(numbers), ()))] for numbers in self.images.values()]
+        return [chosen[place] for place in torch.randperm(len(chosen)).tolist()]
 
     def keep(self, device: torch.device) -> None:
         """Read every sample once and keep it on a device, where it is then transformed under D4."""
-        for row in sorted(self.rows):
+        for row in sorted(self.images):
             inputs, target = self.read(row)
             self.kept[row] = inputs.to(device), target.to(device)
 
@@ -127,7 +136,7 @@ def split_examples(
 def keep_if_they_fit(sets: Sequence[ExampleSet], device: torch.device) -> None:
     """Keep all samples on a device if they take less than half of a GPU's free memory, or `MEMORY`."""
     free = 0.5 * torch.cuda.mem_get_info(device)[0] if device.type == "cuda" else MEMORY
-    numbers = sum(len(each.rows) * each.pixels**2 for each in sets) * (len(INPUTS) + len(FIELDS))
+    numbers = sum(len(each.images) * each.pixels**2 for each in sets) * (len(INPUTS) + len(FIELDS))
     if numbers * torch.finfo(torch.float32).bits // 8 < free:
         for each in sets:
             each.keep(device)

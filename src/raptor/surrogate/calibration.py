@@ -11,13 +11,14 @@ from scipy.optimize import minimize_scalar
 from raptor.core.errors import RaptorError
 from raptor.dataset.examples import training_rows
 from raptor.dataset.stack import Sample, read_samples, read_table
+from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.metrics import without_sign
 from raptor.fields.shape import shape_ratios
-from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import USUAL, Calibration, disagreement, fit_scale
-from raptor.surrogate.inference import Ensemble, Surrogate, deviation
+from raptor.surrogate.ensemble import Ensemble, Realisations
+from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.out_of_distribution import TrainingSet, descriptors
 
 FACTORS = (0.8, 1.25)
@@ -33,27 +34,26 @@ class Case:
 
     Parameters
     ----------
-    cast : CastMould
-    ratios : ndarray (2,)
-        Simulated A/A0 and w/w0.
-    density : ndarray (y, x)
-        Predicted by the ensemble.
-    densities : ndarray (n, y, x)
-        Predicted by each network.
+    simulated : ndarray (4,)
+        Simulated `bands.MEASURED`.
+    found : Realisations
+        Predicted.
     """
 
-    cast: CastMould
-    ratios: NDArray[np.float64]
-    density: NDArray[np.float32]
-    densities: NDArray[np.float32]
+    simulated: NDArray[np.float64]
+    found: Realisations
 
-    def error(self, threshold: float) -> NDArray[np.float64]:
-        """Errors of A/A0 and w/w0, (2,), for a threshold of tissue."""
-        return np.nan_to_num(shape_ratios(self.density, self.cast, threshold)) - self.ratios
+    def error_of_mean(self, threshold: float) -> NDArray[np.float64]:
+        """Errors (4,) of the measures of the mean, for a threshold of tissue.
 
-    def deviation(self, threshold: float) -> NDArray[np.float64]:
-        """Standard deviation (2,) of both ratios over networks."""
-        return deviation(np.array([shape_ratios(each, self.cast, threshold) for each in self.densities]))
+        A tissue torn on its section has no width.
+        """
+        return np.nan_to_num(self.found.of_mean(threshold)) - self.simulated
+
+    def error(self, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Errors (4,) of the estimates, likewise, and deviations over realisations (4,)."""
+        estimate, deviations = self.found.estimate(threshold)
+        return np.nan_to_num(estimate) - self.simulated, deviations
 
 
 def calibrate(
@@ -85,7 +85,9 @@ def calibrate(
         cast = surrogate.cast(mould)
         found = surrogate.ensemble(cast, sample.parameters)
         pixels.append(_draw_pixels(found, sample, np.random.default_rng([seed, number, sample.simulation])))
-        cases.append(Case(cast, shape_ratios(sample.fields[0], cast), found.mean[0], found.densities))
+        ratios = shape_ratios(sample.fields[0], cast)
+        directions = alignment(sample.fields, cast), anisotropy(sample.fields)
+        cases.append(Case(np.array([*ratios, *directions]), found.realisations))
         disagreements.append(disagreement(found.deviation, found.mean))
         distances.append(training.distance(_descriptors(sample)))
         on_progress(sample.simulation)
@@ -94,8 +96,8 @@ def calibrate(
         raise RaptorError(f"{where}: there is no validation sample; raise the campaign's validation")
     simulated = density_threshold(surrogate.layers, surrogate.pixels)
     factor = fit_threshold(cases, simulated)
-    errors = np.array([case.error(factor * simulated) for case in cases])
-    deviations = np.array([case.deviation(factor * simulated) for case in cases])
+    threshold = simulated if surrogate.architecture.noise else factor * simulated
+    errors, deviations = np.array([case.error(threshold) for case in cases]).swapaxes(0, 1)
     return Calibration(
         fit_scale(*np.concatenate(pixels, axis=1)),
         fit_scale(errors, deviations, np.ones_like(errors)),
@@ -135,7 +137,7 @@ def fit_threshold(cases: Sequence[Case], threshold: float) -> float:
     """
 
     def cost(factor: float) -> float:
-        return float(np.nanmean([np.abs(case.error(factor * threshold)) for case in cases]))
+        return float(np.nanmean([np.abs(case.error_of_mean(factor * threshold)[:2]) for case in cases]))
 
     return float(minimize_scalar(cost, bounds=FACTORS, method="bounded", options={"xatol": 1e-3}).x)
 

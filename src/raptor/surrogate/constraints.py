@@ -74,9 +74,7 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     to zero and the rest is scaled to the cells; negative eigenvalues of the tensor are set to zero and its
     trace is scaled to the density.
     """
-    there = reachable(depression)
-    density = fields[:, :1].clamp(min=0.0) * there
-    density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
+    density = allowed_density(fields[:, :1], depression, cells)
     image, y, x = torch.nonzero(density[:, 0], as_tuple=True)  # the tensor is zero elsewhere
     found = fields[image, :, y, x]
     wanted = density[image, 0, y, x]
@@ -87,10 +85,18 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     mended = _positive(tensor[doubtful], wanted[doubtful])
     tensor = tensor * (wanted / trace.clamp(min=SMALL))[:, None, None]
     tensor[doubtful] = mended
-    obeying = torch.cat([density, fields[:, 1:2] * there, torch.zeros_like(fields[:, 2:])], dim=1)
+    tension = fields[:, 1:2] * reachable(depression)
+    obeying = torch.cat([density, tension, torch.zeros_like(fields[:, 2:])], dim=1)
     for channel, (i, j) in {XX: (0, 0), YY: (1, 1), ZZ: (2, 2), XY: (0, 1), XZ: (0, 2), YZ: (1, 2)}.items():
         obeying[image, channel, y, x] = tensor[:, i, j]
     return obeying
+
+
+def allowed_density(density: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+    """Density (n, 1, y, x) without what is negative or out of reach, scaled to the cells: as `project`."""
+    there = density.clamp(min=0.0) * reachable(depression)
+    scaled: Tensor = there * (cells[:, None, None, None] / (there.sum((2, 3), keepdim=True) + SMALL))
+    return scaled
 
 
 def _is_positive(found: Tensor) -> Tensor:

@@ -21,6 +21,7 @@ from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Calibration
 from raptor.surrogate.constraints import project, with_sign
+from raptor.surrogate.ensemble import Ensemble, Realisations, full_fields
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.out_of_distribution import descriptors
 from raptor.surrogate.prediction import Prediction
@@ -29,25 +30,6 @@ from raptor.symmetry import FIELDS, Element, apply, move_pixels
 
 BATCH = 16
 """Images that a network sees at once."""
-
-
-@dataclass(frozen=True)
-class Ensemble:
-    """Predictions of the networks of an ensemble for one tissue, in physical units.
-
-    Parameters
-    ----------
-    mean : ndarray (8, y, x)
-        Over networks and images of D4, projected onto the physical constraints.
-    deviation : ndarray (8, y, x)
-        Standard deviation over networks and images, sxsz and sysz by magnitude.
-    densities : ndarray (networks, y, x)
-        Of each network, means over images.
-    """
-
-    mean: NDArray[np.float32]
-    deviation: NDArray[np.float32]
-    densities: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -82,9 +64,14 @@ class Surrogate:
 
     @cached_property
     def threshold(self) -> float:
-        """Density per pixel above which there is predicted tissue: the simulations' threshold, calibrated."""
+        """Density per pixel above which there is tissue in a mean: the simulations' threshold, calibrated."""
         factor = 1.0 if self.calibration is None else self.calibration.threshold_factor
         return factor * density_threshold(self.layers, self.pixels)
+
+    @property
+    def own_threshold(self) -> float:
+        """The same in realisations: samples have edges as sharp as simulations, other means are blurred."""
+        return density_threshold(self.layers, self.pixels) if self.architecture.noise else self.threshold
 
     @property
     def weights(self) -> int:
@@ -149,15 +136,17 @@ class Surrogate:
             )
         cast, calibration = self.cast(mould), self.calibration
         found = self.ensemble(cast, parameters)
-        ratios = np.array([self.ratios(density, cast) for density in found.densities])
+        measures, deviations = found.realisations.estimate(self.own_threshold)
         point = descriptors(cast.depression, cast.tethers, parameters)
         return Prediction(
             cast,
             parameters,
             found.mean,
-            self.ratios(found.mean[0], cast),
+            measures,
+            found.realisations.held(self.own_threshold),
             calibration.fields.bands(found.deviation, np.abs(found.mean[:1])),
-            calibration.ratios.bands(deviation(ratios), np.ones(2)),
+            calibration.measures.bands(deviations, np.ones(len(measures))),
+            found.answers,
             calibration.relative_disagreement(found.deviation, found.mean),
             calibration.training.distance(point),
             self.threshold,
@@ -165,7 +154,7 @@ class Surrogate:
         )
 
     def ensemble(self, mould: Mould | CastMould, parameters: CellParameters) -> Ensemble:
-        """Mean and standard deviation of the fields, and each network's density.
+        """Mean and standard deviation of the fields, and realisations.
 
         Raises
         ------
@@ -174,11 +163,14 @@ class Surrogate:
         """
         cast = self.cast(mould)
         (answers,) = self._answers(cast, [parameters], Element.all())
-        means = _mean(torch.stack([answers.flatten(0, 1)]))
-        fields = self._finish(torch.cat([means, _mean(answers)]), cast)
-        coarse = without_sign(answers).std(dim=(0, 1))
+        each = answers.flatten(0, 1)
+        mean = _mean(each[None])
+        (full,) = self._finish(mean, cast)
+        coarse = without_sign(each).std(dim=0)
         (fine,) = interpolate(coarse[None], size=2 * (self.pixels,), mode="bilinear").numpy()
-        return Ensemble(fields[0], fine, fields[1:, 0])
+        sampled = self.architecture.noise > 0
+        scattered = torch.cat([mean, each if sampled else _mean(answers)]).numpy()
+        return Ensemble(full, fine, each.numpy(), Realisations.of(cast, scattered, sampled=sampled))
 
     def sample(
         self, mould: Mould | CastMould, parameters: CellParameters, count: int = 8, seed: int = 0
@@ -192,8 +184,7 @@ class Surrogate:
         RaptorError
             As `predict`, and if the networks give one mean.
         """
-        if not self.architecture.noise:
-            raise RaptorError("this model gives one mean, not samples; train one with surrogate.noise")
+        self.require_samples()
         cast, stream = self.cast(mould), torch.Generator().manual_seed(seed)
         elements = [Element.from_index(int(n)) for n in torch.randint(8, (count,), generator=stream)]
         inputs, cells = self._inputs(cast, [parameters], elements)
@@ -204,7 +195,12 @@ class Surrogate:
                 scaled[own] = member.answers(inputs[own], cells[own], 1, stream)[:, 0]
         fields = torch.from_numpy(self.scaling.inverse(scaled.numpy()))
         back = torch.stack([apply(f, e.inverse) for f, e in zip(fields, elements, strict=True)])
-        return self._obey(deconvolve(back, self.pixels), cast)
+        return full_fields(back.numpy(), cast)
+
+    def require_samples(self) -> None:
+        """Raise a RaptorError if the networks give one mean."""
+        if not self.architecture.noise:
+            raise RaptorError("this model gives one mean, not samples; use one with the key noise above 0")
 
     def ratios(self, density: NDArray[np.floating], cast: CastMould) -> NDArray[np.float64]:
         """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
@@ -262,10 +258,3 @@ def _mean(answers: Tensor) -> Tensor:
     D4 moves magnitudes like any image; `constraints.with_sign` gives signs back.
     """
     return without_sign(answers).mean(1)
-
-
-def deviation(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation (2,) over networks (n, 2); 0 of a single one."""
-    if len(ratios) < 2:
-        return np.zeros(2)
-    return np.asarray(np.nan_to_num(ratios.std(axis=0, ddof=1)))

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.labelled import MEASURES, labelled, named
-from raptor.fields.tethers import posts_lost, seen_held
+from raptor.fields.tethers import posts_lost
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
-from raptor.surrogate.bands import LEVELS, Bands
+from raptor.surrogate.bands import LEVELS, MEASURED, Bands
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,12 +31,17 @@ class Prediction:
         Of the tissue.
     values : ndarray (8, y, x)
         The fields, in the order `symmetry.FIELDS`, per pixel.
-    ratios : ndarray (2,)
-        A/A0 and w/w0.
+    measures : ndarray (4,)
+        A/A0, w/w0, alignment and anisotropy.
+    held : ndarray (tethers,)
+        Chance that tissue encloses each tether: the share of samples, or of networks, in which it does. NaN
+        if the tissue as cast does not enclose it.
     field_bands : Bands
         Half widths (levels, 8, y, x) of the calibrated bands about the fields.
-    ratio_bands : Bands
-        Half widths (levels, 2) of those about A/A0 and w/w0.
+    measure_bands : Bands
+        Half widths (levels, 4) of those about the measures.
+    answers : ndarray (n, 8, y', x')
+        What the mean is taken over, on the networks' raster.
     disagreement : float
         Of the networks about density, over the value that 99 % of the validation samples stay below.
     distance : float
@@ -46,18 +50,23 @@ class Prediction:
         Density per pixel above which there is tissue in these fields.
     most_unusual : str
         The descriptor of the input that is least like the training set's, with its value and their range.
+    kept : int
+        Number of samples that `to_dataset` adds, at most `len(answers)`.
     """
 
     cast: CastMould
     parameters: CellParameters
     values: NDArray[np.float32]
-    ratios: NDArray[np.float64]
+    measures: NDArray[np.float64]
+    held: NDArray[np.float64]
     field_bands: Bands
-    ratio_bands: Bands
+    measure_bands: Bands
+    answers: NDArray[np.float32]
     disagreement: float
     distance: float
     threshold: float
     most_unusual: str
+    kept: int = 0
 
     @property
     def mould(self) -> Mould:
@@ -70,34 +79,41 @@ class Prediction:
         return self.cast.layers
 
     @property
+    def ratios(self) -> NDArray[np.float64]:
+        """A/A0 and w/w0, (2,)."""
+        return self.measures[:2]
+
+    @property
     def area_ratio(self) -> float:
         """A/A0."""
-        return float(self.ratios[0])
+        return float(self.measures[0])
 
     @property
     def width_ratio(self) -> float:
         """w/w0 of the central section; NaN where it holds no tissue as cast."""
-        return float(self.ratios[1])
-
-    @cached_property
-    def held(self) -> NDArray[np.float64]:
-        """1 where the predicted tissue encloses a tether, else 0, (tethers,): see `tethers.seen_held`."""
-        return seen_held(self.values[0], self.cast, self.threshold)
-
-    @property
-    def posts_lost(self) -> int:
-        """Tethers that the predicted tissue does not enclose."""
-        return posts_lost(self.held)
+        return float(self.measures[1])
 
     @property
     def alignment(self) -> float:
         """1 where all cells lie along the mould's long side, -1 across it: see `directors.alignment`."""
-        return alignment(self.values, self.cast)
+        return float(self.measures[2])
 
     @property
     def anisotropy(self) -> float:
         """How far cells line up locally, whatever the direction, 0 to 1: see `directors.anisotropy`."""
-        return anisotropy(self.values)
+        return float(self.measures[3])
+
+    @property
+    def posts_lost(self) -> int:
+        """Tethers that the tissue probably does not enclose."""
+        return posts_lost(self.held)
+
+    @cached_property
+    def samples(self) -> NDArray[np.float32]:
+        """Possible tissues (n, 8, y, x), if the networks sample; otherwise each network's mean by image."""
+        from raptor.surrogate.ensemble import full_fields  # here, because torch takes a second to load
+
+        return full_fields(self.answers, self.cast)
 
     @property
     def area_ratio_band(self) -> tuple[float, float]:
@@ -108,6 +124,16 @@ class Prediction:
     def width_ratio_band(self) -> tuple[float, float]:
         """Ends of the 95 % band of w/w0."""
         return self._band(1)
+
+    @property
+    def alignment_band(self) -> tuple[float, float]:
+        """Ends of the 95 % band of alignment."""
+        return self._band(2)
+
+    @property
+    def anisotropy_band(self) -> tuple[float, float]:
+        """Ends of the 95 % band of anisotropy."""
+        return self._band(3)
 
     @property
     def out_of_distribution(self) -> bool:
@@ -144,12 +170,12 @@ class Prediction:
     @property
     def numbers(self) -> dict[str, float | int | bool | str | list[float]]:
         """The predicted numbers by name; bands as half widths."""
-        half = self.ratio_bands.half[-1]
+        half = dict(zip(MEASURED, self.measure_bands.half[-1].tolist(), strict=True))
         return {
             "mould": self.mould.name, **asdict(self.parameters), "layers": self.layers,
-            "area_ratio": self.area_ratio, "area_ratio_band95": float(half[0]),
-            "width_ratio": self.width_ratio, "width_ratio_band95": float(half[1]),
-            "posts_lost": self.posts_lost, "alignment": self.alignment, "anisotropy": self.anisotropy,
+            **dict(zip(MEASURED, self.measures.tolist(), strict=True)),
+            **{f"{name}_band95": band for name, band in half.items()},
+            "posts_lost": self.posts_lost,
             "held": self.held.tolist(),
             "distance": self.distance, "disagreement": self.disagreement,
             "out_of_distribution": self.out_of_distribution,
@@ -157,24 +183,31 @@ class Prediction:
         }  # fmt: skip
 
     def to_dataset(self) -> "xr.Dataset":
-        """`fields`, each with its deviation (`density_std`, ...), and the ratios' bands (level,)."""
+        """`fields`, each with its deviation (`density_std`, ...), and the measures' bands (level,).
+
+        With `kept`, possible tissues too: `samples` (sample, field, y, x).
+        """
         fields = self.fields
         share = named("share of simulations that a band covers")
         added: dict[str, Any] = {"level": ("level", list(LEVELS), share)}
-        for name, half in zip(("area_ratio", "width_ratio"), self.ratio_bands.half.T, strict=True):
+        for name, half in zip(MEASURED, self.measure_bands.half.T, strict=True):
             added[f"{name}_band"] = ("level", half, named(f"half width of the band about {name}"))
         for name in ("disagreement", "distance"):
             text = f"{name}, over its usual value; above 1 do not trust the prediction"
             added[name] = ((), getattr(self, name), named(text))
-        deviations = {
+        added_fields: dict[str, Any] = {
             f"{name}_std": (("y", "x"), image, named(f"standard deviation of the error of {name}, per pixel"))
             for name, image in zip(fields, self.deviation, strict=True)
         }
+        if self.kept:
+            added["field"] = ("field", list(fields), named("name of the field"))
+            possible = named("possible tissues, per pixel")
+            added_fields["samples"] = (("sample", "field", "y", "x"), self.samples[: self.kept], possible)
         about = {"unusual": self.unusual} if self.out_of_distribution else {}
-        return fields.assign_coords(added).assign(deviations).assign_attrs(about)
+        return fields.assign_coords(added).assign(added_fields).assign_attrs(about)
 
     def __str__(self) -> str:
-        half = self.ratio_bands.half[-1]
+        half = self.measure_bands.half[-1]
         said = (
             f"A/A0 {self.area_ratio:.3f} +- {half[0]:.3f}, w/w0 {self.width_ratio:.3f} +- {half[1]:.3f} "
             f"(95 % bands, {self.layers} layers)"
@@ -187,5 +220,5 @@ class Prediction:
         return said
 
     def _band(self, column: int) -> tuple[float, float]:
-        middle, half = float(self.ratios[column]), float(self.ratio_bands.half[-1, column])
+        middle, half = float(self.measures[column]), float(self.measure_bands.half[-1, column])
         return middle - half, middle + half

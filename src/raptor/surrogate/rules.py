@@ -53,7 +53,9 @@ class TrainingRules(Block):
         description="weight of the L1 distance beside the loss of a discriminator (pix2pix: 100); "
         "null: train without one",
     )
-    epochs: Positive = Field(70, description="passes over the augmented examples")
+    epochs: Positive = Field(
+        280, description="passes over the training runs, each in one of its images under D4, drawn at random"
+    )
     batch_size: int = Field(4, ge=2, description="examples per step")
     learning_rate: float = Field(
         1e-3, gt=0, lt=1, description="of Adam; falls linearly to zero over the second half (pix2pix: 2e-4)"

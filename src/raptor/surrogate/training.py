@@ -126,11 +126,11 @@ def _train_epoch(
     epoch: int,
     device: torch.device,
 ) -> dict[str, float]:
-    """One pass over the examples in the epoch's own order; returns its row of the history."""
+    """One pass over the samples, each in a random image, in random order; returns its row of the history."""
     started = time.perf_counter()
     torch.manual_seed(int(np.random.SeedSequence([seed, epoch]).generate_state(1)[0]))
     size = learner.rules.batch_size
-    order = torch.randperm(len(training)).tolist()
+    order = training.shuffled()
     if len(order) % size == 1 and len(order) > 1:
         order.pop()  # batch normalisation needs more than one example
     learner.start_epoch(epoch)
@@ -149,9 +149,9 @@ def _train_epoch(
 def validation_error(
     generator: Generator, examples: ExampleSet, batch_size: int, device: torch.device
 ) -> float:
-    """Mean over the fields `SCORED` of the VRMSE over all examples together.
+    """Mean over the fields `SCORED` of the VRMSE over all samples together, each in its first image.
 
-    Error and variance are summed over the examples before division, so that an example in which nothing
+    Error and variance are summed over the samples before division, so that a sample in which nothing
     happens, with almost no variance, does not dominate. For networks that sample, the CRPS replaces the root
     mean square error.
     """
@@ -159,8 +159,9 @@ def validation_error(
     power = 1 if generator.noise else 2
     stream = torch.Generator().manual_seed(0)
     error, variance = torch.zeros(2, len(SCORED), dtype=torch.float64, device=device)
+    first = [numbers[0] for numbers in examples.images.values()]
     with torch.no_grad():
-        for inputs, target in examples.batches(range(len(examples)), batch_size, device):
+        for inputs, target in examples.batches(first, batch_size, device):
             cells, wanted = cells_of(target, examples.scaling), target[:, SCORED].double()
             answers = generator.answers(inputs, cells, VALIDATION_SAMPLES, stream)[:, :, SCORED].double()
             if generator.noise:
@@ -169,7 +170,7 @@ def validation_error(
                 found = (answers[:, 0] - wanted) ** 2
             error += found.mean(dim=(2, 3)).sum(dim=0)
             variance += wanted.var(dim=(2, 3), correction=0).sum(dim=0)
-    mean, deviation = error / len(examples), torch.sqrt(variance.clamp(min=1e-12) / len(examples))
+    mean, deviation = error / len(first), torch.sqrt(variance.clamp(min=1e-12) / len(first))
     return float((mean ** (1 / power) / deviation).mean())
 
 

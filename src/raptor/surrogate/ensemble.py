@@ -1,0 +1,115 @@
+"""What an ensemble of networks predicts of one tissue: a mean, and realisations that scatter about it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from raptor.fields.directors import alignment, anisotropy
+from raptor.fields.resample import deconvolve
+from raptor.fields.shape import shape_ratios
+from raptor.fields.tethers import seen_held
+from raptor.moulds.cast import CastMould
+from raptor.surrogate.constraints import allowed_density, project
+
+
+@dataclass(frozen=True)
+class Realisations:
+    """A mean and its realisations: samples, or, of networks that give one mean, each network's.
+
+    Parameters
+    ----------
+    cast : CastMould
+    densities : ndarray (1 + n, y', x')
+        The mean's, then those of the realisations, on the networks' raster.
+    directions : ndarray (1 + n, 2)
+        Alignment and anisotropy, likewise.
+    sampled : bool
+        Whether each realisation is a possible tissue. Measures are then means over these; of blurred means
+        they would be biased.
+    """
+
+    cast: CastMould
+    densities: NDArray[np.float32]
+    directions: NDArray[np.float64]
+    sampled: bool
+
+    @classmethod
+    def of(cls, cast: CastMould, fields: NDArray[np.float32], *, sampled: bool) -> "Realisations":
+        """Those of fields (1 + n, 8, y', x'), the mean first."""
+        directions = np.array([(alignment(each, cast), anisotropy(each)) for each in fields])
+        return cls(cast, fields[:, 0], directions, sampled)
+
+    def of_mean(self, threshold: float) -> NDArray[np.float64]:
+        """The mean's `bands.MEASURED` (4,); `threshold` is the density above which there is tissue."""
+        (density,) = self._full(slice(1))
+        return np.array([*shape_ratios(density, self.cast, threshold), *self.directions[0]])
+
+    def estimate(self, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Estimates of `bands.MEASURED` (4,) and their standard deviations over realisations (4,)."""
+        ratios = [shape_ratios(density, self.cast, threshold) for density in self._full(slice(1, None))]
+        each = np.column_stack([ratios, self.directions[1:]])
+        return _mean(each) if self.sampled else self.of_mean(threshold), deviation(each)
+
+    def held(self, threshold: float) -> NDArray[np.float64]:
+        """Chance that tissue encloses each tether (tethers,): the share of realisations in which it does.
+
+        NaN if the tissue as cast does not enclose it: see `tethers.seen_held`.
+        """
+        each = [seen_held(density, self.cast, threshold) for density in self._full(slice(1, None))]
+        return np.asarray(np.mean(each, axis=0))
+
+    def _full(self, which: slice) -> NDArray[np.float32]:
+        """Densities (n, y, x) at full resolution."""
+        return full_density(self.densities[which], self.cast)
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Predictions of the networks of an ensemble for one tissue, in physical units.
+
+    Parameters
+    ----------
+    mean : ndarray (8, y, x)
+        Over networks and images of D4, projected onto the physical constraints.
+    deviation : ndarray (8, y, x)
+        Standard deviation over networks and images, sxsz and sysz by magnitude.
+    answers : ndarray (n, 8, y', x')
+        Of each network for each image of D4, moved back, on the networks' raster; samples if they sample.
+    realisations : Realisations
+    """
+
+    mean: NDArray[np.float32]
+    deviation: NDArray[np.float32]
+    answers: NDArray[np.float32]
+    realisations: Realisations
+
+
+def full_density(coarse: NDArray[np.float32], cast: CastMould) -> NDArray[np.float32]:
+    """Densities (n, y, x) at a mould's resolution from block averages, as the physics allows."""
+    fine = deconvolve(torch.from_numpy(coarse), cast.pixels)[:, None]
+    depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
+    found = allowed_density(fine, depression, torch.tensor([float(cast.n_cells)]))
+    return np.asarray(found[:, 0].numpy())
+
+
+def full_fields(coarse: NDArray[np.float32], cast: CastMould) -> NDArray[np.float32]:
+    """Fields (n, 8, y, x) at a mould's resolution from block averages, as the physics allows."""
+    depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
+    fine = deconvolve(torch.from_numpy(coarse), cast.pixels)
+    return np.asarray(project(fine, depression, torch.tensor([float(cast.n_cells)])).numpy())
+
+
+def _mean(each: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means (k,) of (n, k) without NaN; NaN of those that are all NaN."""
+    known = np.isfinite(each)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(known, each, 0.0).sum(axis=0) / known.sum(axis=0))
+
+
+def deviation(each: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviations (k,) over realisations (n, k); 0 of a single one."""
+    if len(each) < 2:
+        return np.zeros(each.shape[1])
+    return np.asarray(np.nan_to_num(each.std(axis=0, ddof=1)))

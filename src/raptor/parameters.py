@@ -27,6 +27,16 @@ class Bounds:
     lower: float
     upper: float
 
+    @property
+    def middle(self) -> float:
+        """Half way between both ends."""
+        return (self.lower + self.upper) / 2
+
+    @property
+    def half(self) -> float:
+        """Distance of either end from the middle."""
+        return (self.upper - self.lower) / 2
+
     def __contains__(self, value: float) -> bool:
         return self.lower <= value < self.upper
 

@@ -60,10 +60,23 @@ def test_reach_is_five_sigma_and_covers_thin_posts():
 
 def test_outputs_obey_the_physics_by_construction():
     head = constraints.PhysicalFields(SCALING)
-    cells = torch.full((3,), float(CELLS))
+    cells, delta = torch.full((3,), float(CELLS)), torch.tensor([0.1, 0.5, 0.9])
     for size in (1.0, 30.0):
-        scaled = head(size * random_fields(), depression().expand(3, -1, -1, -1), cells)
+        scaled = head(size * random_fields(), depression().expand(3, -1, -1, -1), cells, delta)
         require_physical(torch.from_numpy(SCALING.inverse(scaled.numpy())), small=1e-4)
+
+
+def test_there_is_no_tension_where_there_is_no_tissue():
+    masks, cells = depression(), torch.tensor([float(CELLS)])
+    fields = random_fields()
+    fields[:, 0, :, : PIXELS // 2] = -1.0
+    free = fields.clone()
+    free[:, 0] *= 40.0  # softplus leaves nothing
+    delta = torch.full((len(free),), 0.5)
+    head = constraints.PhysicalFields(SCALING)(free, masks.expand(len(free), -1, -1, -1), cells, delta)
+    for made in (constraints.project(fields, masks, cells), torch.from_numpy(SCALING.inverse(head.numpy()))):
+        assert (made[:, 1, :, : PIXELS // 2].abs() < 1e-9).all()
+        assert (made[:, 1, :, PIXELS // 2 :] != 0).any()
 
 
 def test_any_fields_obey_it_after_projection_and_physical_ones_stay():

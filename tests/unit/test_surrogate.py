@@ -16,6 +16,7 @@ from raptor.moulds import Mould
 from raptor.moulds.cast import CastMould
 from raptor.parameters import CellParameters
 from raptor.surrogate.batches import ExampleSet, split_examples
+from raptor.surrogate.constraints import CELL_TENSION
 from raptor.surrogate.ensemble import full_density
 from raptor.surrogate.files import load, save
 from raptor.surrogate.generator import Generator
@@ -25,6 +26,7 @@ from raptor.surrogate.losses import (
     FAIR,
     adversarial_loss,
     almost_fair_score,
+    balanced,
     discriminator_loss,
     reconstruction_loss,
     sample_loss,
@@ -103,10 +105,24 @@ def test_samples_of_the_right_distribution_score_best():
     assert float(sample_loss(noise, alike)) > float(sample_loss(smooth, alike))
 
 
+def test_tension_counts_alike_at_small_and_large_delta():
+    delta = torch.tensor([0.1, 0.9])
+    fields = torch.ones(2, 8, 4, 4)
+    fields[:, 1] = delta[:, None, None] ** 2
+    even = balanced(fields, delta)
+    assert even[0, 1, 0, 0] == pytest.approx(0.01 / 0.03)
+    assert even[1, 1, 0, 0] == pytest.approx(0.81 / 0.83)
+    assert (even[:, [0, *range(2, 8)]] == 1).all()
+    samples = fields[:, None].expand(-1, 3, -1, -1, -1)
+    assert torch.equal(balanced(samples, delta)[:, 2], even)
+
+
 def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
     architecture = Architecture(pixels=16, base_channels=4, noise=4)
     rules = TrainingRules(epochs=200, learning_rate=3e-3)
-    learner = Learner(architecture, SCALING, rules, 0, torch.device("cpu"))
+    of_a_cell = CELL_TENSION * 0.5**2  # the middle of Delta, which inputs of zero stand for
+    scaling = Scaling(SCALING.offset, (1.0, of_a_cell, *SCALING.scale[2:]))
+    learner = Learner(architecture, scaling, rules, 0, torch.device("cpu"))
     learner.start_epoch(0)
     inputs = torch.zeros(16, 5, 16, 16)
     inputs[:, 0] = 1.0

@@ -19,7 +19,8 @@ from raptor.symmetry import FIELDS
 
 SHARED = (("sxsx", "sysy"), ("sxsz", "sysz"))
 SIGNED = ("tension", "sxsy", "sxsz", "sysz")
-INPUTS = ("depression", "tethers", "delta", "kappa_nnn", "kappa_nnnn")
+SCALED = {"delta": DELTA, "kappa_nnn": KAPPA_NNN, "kappa_nnnn": KAPPA_NNNN}
+INPUTS = ("depression", "tethers", *SCALED)
 
 
 @dataclass(frozen=True)
@@ -74,11 +75,8 @@ def scale_inputs(
     channels = np.empty((len(INPUTS), *depression.shape), dtype=np.float32)
     channels[0] = 2.0 * depression - 1.0
     channels[1] = 2.0 * tethers - 1.0
-    for row, (name, bounds) in enumerate(
-        (("delta", DELTA), ("kappa_nnn", KAPPA_NNN), ("kappa_nnnn", KAPPA_NNNN)), start=2
-    ):
-        middle, half = (bounds.upper + bounds.lower) / 2, (bounds.upper - bounds.lower) / 2
-        channels[row] = (getattr(parameters, name) - middle) / half
+    for row, (name, bounds) in enumerate(SCALED.items(), start=2):
+        channels[row] = (getattr(parameters, name) - bounds.middle) / bounds.half
     return channels
 
 

@@ -2,7 +2,8 @@
 
 Density is non-negative, zero deeper than 5 sigma in a wall, and sums to the number of cells; the
 orientation tensor (sums of s s^T over a pixel's cells) is positive semi-definite with the density as its
-trace. The sign of (sxsz, sysz) is spontaneous, so averages are of magnitudes.
+trace. Tension is zero where there is no tissue. The sign of (sxsz, sysz) is spontaneous, so averages are of
+magnitudes.
 """
 
 import math
@@ -18,6 +19,12 @@ from raptor.symmetry import FIELDS
 
 SMALL = 1e-12
 ROUNDING = 1e-5
+TRACE = 0.01
+"""Density, over its mean in the mould as cast, below which there is no tissue that could carry tension."""
+
+CELL_TENSION = 0.012
+"""Mean bond tension of a cell at Delta 1, kappa0 l0; it grows as Delta^2 (exponent 1.98 over 576 runs)."""
+
 XX, YY, ZZ, XY, XZ, YZ = (FIELDS.index(name) for name in ("sxsx", "sysy", "szsz", "sxsy", "sxsz", "sysz"))
 ROWS = [[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]]
 
@@ -40,8 +47,8 @@ class PhysicalFields(nn.Module):
     """Turns eight free channels into scaled fields that obey the constraints.
 
     Density is softplus of the first channel, where it may be, scaled to the number of cells. The tensor is
-    density L L^T / tr(L L^T) with L a lower triangle made of the last six channels. Tension is free where
-    density may be.
+    density L L^T / tr(L L^T) with L a lower triangle made of the last six channels. Tension is the second
+    channel, in units of `CELL_TENSION` Delta^2 a cell, times density.
     """
 
     offset: Tensor
@@ -54,15 +61,14 @@ class PhysicalFields(nn.Module):
         self.register_buffer("scale", torch.tensor(scaling.scale)[:, None, None])
         self.register_buffer("isotropic", torch.tensor([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None, None])
 
-    def forward(self, free: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
-        """Scaled fields (n, 8, y, x) from free channels, masks (n, 1, y, x) from 0 to 1, and cells (n,)."""
-        there = reachable(depression)
-        density = softplus(free[:, :1]) * there
-        density = density * (cells[:, None, None, None] / (density.sum((2, 3), keepdim=True) + SMALL))
+    def forward(self, free: Tensor, depression: Tensor, cells: Tensor, delta: Tensor) -> Tensor:
+        """Scaled fields (n, 8, y, x) of free channels, masks (n, 1, y, x) from 0 to 1, cells and Delta (n,)."""
+        density = allowed_density(softplus(free[:, :1]), depression, cells)
         a, b, c, d, e, f = torch.split(free[:, 2:] + self.isotropic, 1, dim=1)
         parts = [a * a, b * b + c * c, d * d + e * e + f * f, a * b, a * d, b * d + c * e]
         each = density / (parts[0] + parts[1] + parts[2] + SMALL)
-        tension = free[:, 1:2] * self.scale[1] * there
+        each_cell = CELL_TENSION * delta[:, None, None, None] ** 2 * free[:, 1:2]
+        tension = each_cell * density * is_tissue(density, depression, cells)
         fields = torch.cat([density, tension, *(each * part for part in parts)], dim=1)
         return (fields - self.offset) / self.scale
 
@@ -85,7 +91,7 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     mended = _positive(tensor[doubtful], wanted[doubtful])
     tensor = tensor * (wanted / trace.clamp(min=SMALL))[:, None, None]
     tensor[doubtful] = mended
-    tension = fields[:, 1:2] * reachable(depression)
+    tension = fields[:, 1:2] * is_tissue(density, depression, cells)
     obeying = torch.cat([density, tension, torch.zeros_like(fields[:, 2:])], dim=1)
     for channel, (i, j) in {XX: (0, 0), YY: (1, 1), ZZ: (2, 2), XY: (0, 1), XZ: (0, 2), YZ: (1, 2)}.items():
         obeying[image, channel, y, x] = tensor[:, i, j]
@@ -97,6 +103,12 @@ def allowed_density(density: Tensor, depression: Tensor, cells: Tensor) -> Tenso
     there = density.clamp(min=0.0) * reachable(depression)
     scaled: Tensor = there * (cells[:, None, None, None] / (there.sum((2, 3), keepdim=True) + SMALL))
     return scaled
+
+
+def is_tissue(density: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+    """Where density (n, 1, y, x) is more than a trace, 1, else 0."""
+    as_cast = cells[:, None, None, None] / depression.sum((2, 3), keepdim=True).clamp(min=1.0)
+    return (density > TRACE * as_cast).to(density.dtype)
 
 
 def _is_positive(found: Tensor) -> Tensor:

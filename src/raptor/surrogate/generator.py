@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor, nn
 
-from raptor.dataset.scaling import Scaling
+from raptor.dataset.scaling import INPUTS, Scaling
+from raptor.parameters import DELTA
 from raptor.surrogate.constraints import PhysicalFields
 from raptor.surrogate.networks import NETWORKS, PHYSICAL
 from raptor.surrogate.rules import Architecture
@@ -25,7 +26,7 @@ class Generator(nn.Module):
         found: Tensor = self.network(inputs) if noise is None else self.network(inputs, noise)
         if self.physical is None:
             return found
-        fields: Tensor = self.physical(found.float(), 0.5 * (inputs[:, :1] + 1), cells)
+        fields: Tensor = self.physical(found.float(), 0.5 * (inputs[:, :1] + 1), cells, delta_of(inputs))
         return fields
 
     def answers(self, inputs: Tensor, cells: Tensor, count: int, stream: torch.Generator) -> Tensor:
@@ -47,3 +48,8 @@ class Generator(nn.Module):
             name: value for name, value in self.state_dict().items() if name.endswith("embed.noise.weight")
         }
         self.load_state_dict(own | dict(weights))
+
+
+def delta_of(inputs: Tensor) -> Tensor:
+    """Delta (n,) of scaled inputs (n, 5, y, x)."""
+    return DELTA.middle + DELTA.half * inputs[:, INPUTS.index("delta"), 0, 0]

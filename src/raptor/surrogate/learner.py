@@ -7,8 +7,14 @@ import torch
 from torch import Tensor, nn
 
 from raptor.dataset.scaling import Scaling
-from raptor.surrogate.generator import Generator
-from raptor.surrogate.losses import adversarial_loss, discriminator_loss, reconstruction_loss, sample_loss
+from raptor.surrogate.generator import Generator, delta_of
+from raptor.surrogate.losses import (
+    adversarial_loss,
+    balanced,
+    discriminator_loss,
+    reconstruction_loss,
+    sample_loss,
+)
 from raptor.surrogate.networks import Discriminator
 from raptor.surrogate.rules import Architecture, TrainingRules
 
@@ -68,15 +74,20 @@ class Learner:
 
     def step(self, inputs: Tensor, target: Tensor) -> Tensor:
         """Update the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
-        cells = cells_of(target, self.scaling)
+        cells, delta = cells_of(target, self.scaling), delta_of(inputs)
         if self.generator.noise:
             noise = torch.randn(SAMPLES * len(inputs), self.generator.noise, device=inputs.device)
             repeated = inputs.repeat_interleave(SAMPLES, 0), cells.repeat_interleave(SAMPLES, 0)
             samples = self._evaluate("generator", *repeated, noise).reshape(-1, SAMPLES, *target.shape[1:])
-            prediction, reconstruction = samples[:, 0], sample_loss(samples, target)
+            prediction = samples[:, 0]
+            reconstruction = sample_loss(balanced(samples, delta), balanced(target, delta))
         else:
             prediction = self._evaluate("generator", inputs, cells)
-            reconstruction = reconstruction_loss(prediction, target, signed="discriminator" in self.networks)
+            pair = prediction, target
+            if "discriminator" in self.networks:  # as published
+                reconstruction = reconstruction_loss(*pair, signed=True)
+            else:
+                reconstruction = reconstruction_loss(*(balanced(each, delta) for each in pair), signed=False)
         total = (self.rules.lambda_l1 or RECONSTRUCTION_WEIGHT) * reconstruction
         adversary = torch.zeros((), device=inputs.device)
         if "discriminator" in self.networks:

@@ -13,9 +13,13 @@ from torch.nn.functional import binary_cross_entropy_with_logits, l1_loss
 
 from raptor.fields.metrics import without_sign
 from raptor.fields.resample import block_average
+from raptor.symmetry import FIELDS
 
 FAIR = 0.95
 """Share of the fair score in the almost-fair one; the rest keeps samples from diverging."""
+
+LEAST = 0.02
+"""Added to Delta^2 where tension is divided by it."""
 
 SQUARES = (2, 4, 8)
 """Sides, in pixels, of the squares over which samples are averaged for the energy scores."""
@@ -30,6 +34,16 @@ def reconstruction_loss(prediction: Tensor, target: Tensor, *, signed: bool) -> 
     if not signed:
         prediction, target = without_sign(prediction), without_sign(target)
     return l1_loss(prediction, target)
+
+
+def balanced(fields: Tensor, delta: Tensor) -> Tensor:
+    """Scaled fields (n, ..., 8, y, x) with tension over Delta^2 (n,), which it grows as.
+
+    Otherwise its errors at small Delta would not count. `LEAST` keeps what is zero from being divided by it.
+    """
+    weight = torch.ones(len(FIELDS), device=fields.device).repeat(len(delta), 1)
+    weight[:, FIELDS.index("tension")] = 1 / (delta**2 + LEAST)
+    return fields * weight.reshape(len(delta), *(1,) * (fields.ndim - 4), len(FIELDS), 1, 1)
 
 
 def sample_loss(samples: Tensor, target: Tensor) -> Tensor:

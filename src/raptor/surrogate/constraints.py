@@ -62,7 +62,7 @@ class PhysicalFields(nn.Module):
         self.register_buffer("isotropic", torch.tensor([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None, None])
 
     def forward(self, free: Tensor, depression: Tensor, cells: Tensor, delta: Tensor) -> Tensor:
-        """Scaled fields (n, 8, y, x) of free channels, masks (n, 1, y, x) from 0 to 1, cells and Delta (n,)."""
+        """Scaled fields (n, 8, y, x); masks (n, 1, y, x) are from 0 to 1, numbers of cells and Delta (n,)."""
         density = allowed_density(softplus(free[:, :1]), depression, cells)
         a, b, c, d, e, f = torch.split(free[:, 2:] + self.isotropic, 1, dim=1)
         parts = [a * a, b * b + c * c, d * d + e * e + f * f, a * b, a * d, b * d + c * e]

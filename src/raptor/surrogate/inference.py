@@ -1,6 +1,6 @@
 """Prediction by an ensemble of networks: from a mould and parameters to the eight fields."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -187,7 +187,7 @@ class Surrogate:
         self.require_samples()
         cast, stream = self.cast(mould), torch.Generator().manual_seed(seed)
         elements = [Element.from_index(int(n)) for n in torch.randint(8, (count,), generator=stream)]
-        inputs, cells = self._inputs(cast, [parameters], elements)
+        inputs, cells = self._inputs(cast, [parameters], self._images(cast, elements))
         scaled = torch.empty(count, len(FIELDS), *inputs.shape[2:])
         with torch.no_grad():
             for number, member in enumerate(self.members):
@@ -206,37 +206,52 @@ class Surrogate:
         """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
         return shape_ratios(density, cast, self.threshold)
 
+    def _images(self, cast: CastMould, elements: Sequence[Element]) -> list[NDArray[np.float32]]:
+        """Masks (2, y', x') of a mould's images under D4 on the networks' raster."""
+        masks = np.stack([cast.depression, cast.tethers]).astype(np.float32)
+        averaged = block_average(masks, self.architecture.pixels)
+        return [np.ascontiguousarray(move_pixels(averaged, element)) for element in elements]
+
     def _inputs(
-        self, cast: CastMould, cells: Sequence[CellParameters], elements: Sequence[Element]
+        self, cast: CastMould, cells: Sequence[CellParameters], images: Sequence[NDArray[np.float32]]
     ) -> tuple[Tensor, Tensor]:
-        """Scaled inputs (n * elements, 5, y', x') and numbers of cells, on the networks' raster."""
+        """Scaled inputs (n * images, 5, y', x') and numbers of cells."""
         for parameters in cells:
             parameters.require_sampled("prediction")
-        pixels = self.architecture.pixels
-        masks = np.stack([cast.depression, cast.tethers]).astype(np.float32)
-        moved = [move_pixels(block_average(masks, pixels), element) for element in elements]
-        scaled_inputs = [scale_inputs(depression, tethers, p) for p in cells for depression, tethers in moved]
-        inputs = torch.from_numpy(np.stack(scaled_inputs))
+        inputs = torch.from_numpy(
+            np.stack([scale_inputs(masks[0], masks[1], p) for p in cells for masks in images])
+        )
         # Fields are per pixel of the full raster; the networks give their block averages.
-        return inputs, torch.full((len(inputs),), cast.n_cells * (pixels / self.pixels) ** 2)
+        return inputs, torch.full((len(inputs),), cast.n_cells * (images[0].shape[-1] / self.pixels) ** 2)
 
     def _answers(
         self, cast: CastMould, cells: Sequence[CellParameters], elements: Sequence[Element]
     ) -> Tensor:
         """Prediction of each network for each image under D4, moved back: (n, members, elements, 8, y', x').
 
-        In physical units, on the networks' raster. Networks that sample give one sample of each.
+        In physical units, on the networks' raster. Networks that sample give one sample of each, with the
+        same noise for every set of parameters, so that predictions change smoothly with these.
         """
-        inputs, counts = self._inputs(cast, cells, elements)
-        parts = list(zip(torch.split(inputs, BATCH), torch.split(counts, BATCH), strict=True))
-        stream = torch.Generator().manual_seed(0)
+        images = self._images(cast, elements)
+        places, stream = list(range(len(images))), torch.Generator().manual_seed(0)
+        noise = [torch.randn(len(images), self.architecture.noise, generator=stream) for _ in self.members]
+        if not self.architecture.noise:  # of images that repeat, as a symmetric mould's do, one is enough
+            numbers: dict[bytes, int] = {}
+            places = [numbers.setdefault(masks.tobytes(), len(numbers)) for masks in images]
+            images = [images[places.index(number)] for number in range(len(numbers))]
+        inputs, counts = self._inputs(cast, cells, images)
         with torch.no_grad():
             scaled = [
-                torch.cat([member.answers(*part, 1, stream)[:, 0] for part in parts])
-                for member in self.members
+                torch.cat(
+                    [
+                        member(*part)
+                        for part in _parts(inputs, counts, own[: len(images)].repeat(len(cells), 1))
+                    ]
+                )
+                for member, own in zip(self.members, noise, strict=True)
             ]
         fields = torch.from_numpy(self.scaling.inverse(torch.stack(scaled, dim=1).numpy()))
-        fields = fields.reshape(len(cells), len(elements), *fields.shape[1:])
+        fields = fields.reshape(len(cells), len(images), *fields.shape[1:])[:, places]
         back = [apply(fields[:, number], element.inverse) for number, element in enumerate(elements)]
         return torch.stack(back, dim=2)
 
@@ -250,6 +265,12 @@ class Surrogate:
             depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
             fields = project(fields, depression, torch.tensor([float(cast.n_cells)]))
         return np.asarray(fields.numpy())
+
+
+def _parts(inputs: Tensor, counts: Tensor, noise: Tensor) -> Iterator[tuple[Tensor, Tensor, Tensor | None]]:
+    """Batches of inputs, numbers of cells and noise, None of networks without."""
+    for part, cells, own in zip(*(torch.split(each, BATCH) for each in (inputs, counts, noise)), strict=True):
+        yield part, cells, own if own.shape[1] else None
 
 
 def _mean(answers: Tensor) -> Tensor:

@@ -129,7 +129,7 @@ def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
     target = torch.zeros(16, 8, 16, 16)
     target[:, 0] = target[:, 4] = 1.0
     target[:8, 1], target[8:, 1] = 1.0, -1.0  # tension of either sign
-    for _ in range(60):
+    for _ in range(150):
         learner.step(inputs, target)
     learner.generator.eval()
     stream = torch.Generator().manual_seed(1)

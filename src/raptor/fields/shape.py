@@ -6,6 +6,7 @@ paper's words, they would depend on where walls fall between rows of the lattice
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -35,11 +36,16 @@ def shape_ratios(
     threshold : float or None
         Density per pixel above which there is tissue; None for `cast.threshold`, that of the tissue as cast.
     """
-    tissue, before = filled(density, cast, threshold), filled(cast.density, cast)
-    lines = [cast.central_section]
-    whole = area_above(before)
+    tissue, (whole, width) = filled(density, cast, threshold), _as_cast(cast)
     area = area_above(tissue) / whole if whole > 0 else np.nan
-    return np.array([area, _ratio(_length(tissue, lines), _length(before, lines))])
+    return np.array([area, _ratio(_length(tissue, [cast.central_section]), width)])
+
+
+@lru_cache(maxsize=8)
+def _as_cast(cast: CastMould) -> tuple[float, float]:
+    """Area, in pixels, and length on the central section, l0, of the tissue as cast."""
+    before = filled(cast.density, cast)
+    return area_above(before), _length(before, [cast.central_section])
 
 
 def section_ratio(

@@ -1,5 +1,7 @@
 """Attachment of tissue to its tethers."""
 
+from functools import lru_cache
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -59,9 +61,16 @@ def seen_held(
     The counterpart of `held` for images. NaN if the tissue as cast does not enclose the tether.
     """
     free = outside(density, ENCLOSING * (cast.threshold if threshold is None else threshold))
-    free_as_cast = outside(cast.density, ENCLOSING * cast.threshold)
     inside = [depth >= 0 for depth in cast.tether_depths]
-    return np.array([np.nan if free_as_cast[mask].any() else float(not free[mask].any()) for mask in inside])
+    enclosed = zip(inside, _enclosed_as_cast(cast), strict=True)
+    return np.array([float(not free[mask].any()) if before else np.nan for mask, before in enclosed])
+
+
+@lru_cache(maxsize=8)
+def _enclosed_as_cast(cast: CastMould) -> list[bool]:
+    """Whether the tissue as cast encloses each tether."""
+    free = outside(cast.density, ENCLOSING * cast.threshold)
+    return [not free[depth >= 0].any() for depth in cast.tether_depths]
 
 
 def _rim(polygon: shapely.Polygon) -> NDArray[np.float64]:

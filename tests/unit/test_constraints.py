@@ -67,29 +67,29 @@ def test_outputs_obey_the_physics_by_construction():
 
 
 def test_there_is_no_tension_where_there_is_no_tissue():
-    masks, cells = depression(), torch.tensor([float(CELLS)])
+    there, cells = constraints.reachable(depression()), torch.tensor([float(CELLS)])
     fields = random_fields()
     fields[:, 0, :, : PIXELS // 2] = -1.0
     free = fields.clone()
     free[:, 0] *= 40.0  # softplus leaves nothing
     delta = torch.full((len(free),), 0.5)
-    head = constraints.PhysicalFields(SCALING)(free, masks.expand(len(free), -1, -1, -1), cells, delta)
-    for made in (constraints.project(fields, masks, cells), torch.from_numpy(SCALING.inverse(head.numpy()))):
+    head = constraints.PhysicalFields(SCALING)(free, depression().expand(len(free), -1, -1, -1), cells, delta)
+    for made in (constraints.project(fields, there, cells), torch.from_numpy(SCALING.inverse(head.numpy()))):
         assert (made[:, 1, :, : PIXELS // 2].abs() < 1e-9).all()
         assert (made[:, 1, :, PIXELS // 2 :] != 0).any()
 
 
 def test_any_fields_obey_it_after_projection_and_physical_ones_stay():
-    masks, cells = depression(), torch.tensor([float(CELLS)])
-    once = constraints.project(random_fields(), masks, cells)
+    there, cells = constraints.reachable(depression()), torch.tensor([float(CELLS)])
+    once = constraints.project(random_fields(), there, cells)
     require_physical(once)
-    twice = constraints.project(once, masks, cells)
+    twice = constraints.project(once, there, cells)
     assert (twice - once).abs().max() < 1e-4 * once.abs().max()
 
 
 def test_an_average_obeys_it_and_keeps_what_does_not_change():
-    masks, cells = depression().expand(3, -1, -1, -1), torch.full((3,), float(CELLS))
-    fields = constraints.project(random_fields(), masks, cells)
+    there, cells = constraints.reachable(depression()).expand(3, -1, -1, -1), torch.full((3,), float(CELLS))
+    fields = constraints.project(random_fields(), there, cells)
     require_physical(constraints.with_sign(without_sign(fields).mean(0, keepdim=True)))
     alike, top = constraints.with_sign(without_sign(fields[:1])), fields[0].abs().max()
     assert (without_sign(alike) - without_sign(fields[:1])).abs().max() < 1e-3 * top

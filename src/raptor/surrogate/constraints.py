@@ -20,7 +20,7 @@ from raptor.symmetry import FIELDS
 SMALL = 1e-12
 ROUNDING = 1e-5
 TRACE = 0.01
-"""Density, over its mean in the mould as cast, below which there is no tissue that could carry tension."""
+"""Density, over its mean where it may be, below which there is no tissue that could carry tension."""
 
 CELL_TENSION = 0.012
 """Mean bond tension of a cell at Delta 1, kappa0 l0; it grows as Delta^2 (exponent 1.98 over 576 runs)."""
@@ -63,24 +63,25 @@ class PhysicalFields(nn.Module):
 
     def forward(self, free: Tensor, depression: Tensor, cells: Tensor, delta: Tensor) -> Tensor:
         """Scaled fields (n, 8, y, x); masks (n, 1, y, x) are from 0 to 1, numbers of cells and Delta (n,)."""
-        density = allowed_density(softplus(free[:, :1]), depression, cells)
+        there = reachable(depression)
+        density = allowed_density(softplus(free[:, :1]), there, cells)
         a, b, c, d, e, f = torch.split(free[:, 2:] + self.isotropic, 1, dim=1)
         parts = [a * a, b * b + c * c, d * d + e * e + f * f, a * b, a * d, b * d + c * e]
         each = density / (parts[0] + parts[1] + parts[2] + SMALL)
         each_cell = CELL_TENSION * delta[:, None, None, None] ** 2 * free[:, 1:2]
-        tension = each_cell * density * is_tissue(density, depression, cells)
+        tension = each_cell * density * is_tissue(density, there, cells)
         fields = torch.cat([density, tension, *(each * part for part in parts)], dim=1)
         return (fields - self.offset) / self.scale
 
 
-def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+def project(fields: Tensor, there: Tensor, cells: Tensor) -> Tensor:
     """Fields (n, 8, y, x) in physical units projected onto the constraints, for networks that violate them.
 
-    Masks are (n or 1, 1, y, x), numbers of cells (n or 1,). Negative density and density out of reach are set
-    to zero and the rest is scaled to the cells; negative eigenvalues of the tensor are set to zero and its
-    trace is scaled to the density.
+    `there` is where density may be (`reachable`), (n or 1, 1, y, x); numbers of cells are (n or 1,). Negative
+    density and density out of reach are set to zero and the rest is scaled to the cells; negative eigenvalues
+    of the tensor are set to zero and its trace is scaled to the density.
     """
-    density = allowed_density(fields[:, :1], depression, cells)
+    density = allowed_density(fields[:, :1], there, cells)
     image, y, x = torch.nonzero(density[:, 0], as_tuple=True)  # the tensor is zero elsewhere
     found = fields[image, :, y, x]
     wanted = density[image, 0, y, x]
@@ -91,23 +92,23 @@ def project(fields: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
     mended = _positive(tensor[doubtful], wanted[doubtful])
     tensor = tensor * (wanted / trace.clamp(min=SMALL))[:, None, None]
     tensor[doubtful] = mended
-    tension = fields[:, 1:2] * is_tissue(density, depression, cells)
+    tension = fields[:, 1:2] * is_tissue(density, there, cells)
     obeying = torch.cat([density, tension, torch.zeros_like(fields[:, 2:])], dim=1)
     for channel, (i, j) in {XX: (0, 0), YY: (1, 1), ZZ: (2, 2), XY: (0, 1), XZ: (0, 2), YZ: (1, 2)}.items():
         obeying[image, channel, y, x] = tensor[:, i, j]
     return obeying
 
 
-def allowed_density(density: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+def allowed_density(density: Tensor, there: Tensor, cells: Tensor) -> Tensor:
     """Density (n, 1, y, x) without what is negative or out of reach, scaled to the cells: as `project`."""
-    there = density.clamp(min=0.0) * reachable(depression)
-    scaled: Tensor = there * (cells[:, None, None, None] / (there.sum((2, 3), keepdim=True) + SMALL))
+    kept = density.clamp(min=0.0) * there
+    scaled: Tensor = kept * (cells[:, None, None, None] / (kept.sum((2, 3), keepdim=True) + SMALL))
     return scaled
 
 
-def is_tissue(density: Tensor, depression: Tensor, cells: Tensor) -> Tensor:
+def is_tissue(density: Tensor, there: Tensor, cells: Tensor) -> Tensor:
     """Where density (n, 1, y, x) is more than a trace, 1, else 0."""
-    as_cast = cells[:, None, None, None] / depression.sum((2, 3), keepdim=True).clamp(min=1.0)
+    as_cast = cells[:, None, None, None] / there.sum((2, 3), keepdim=True).clamp(min=1.0)
     return (density > TRACE * as_cast).to(density.dtype)
 
 

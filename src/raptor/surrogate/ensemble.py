@@ -1,17 +1,19 @@
 """What an ensemble of networks predicts of one tissue: a mean, and realisations that scatter about it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.resample import deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.fields.tethers import seen_held
 from raptor.moulds.cast import CastMould
-from raptor.surrogate.constraints import allowed_density, project
+from raptor.surrogate.constraints import allowed_density, project, reachable
 
 
 @dataclass(frozen=True)
@@ -89,16 +91,19 @@ class Ensemble:
 def full_density(coarse: NDArray[np.float32], cast: CastMould) -> NDArray[np.float32]:
     """Densities (n, y, x) at a mould's resolution from block averages, as the physics allows."""
     fine = deconvolve(torch.from_numpy(coarse), cast.pixels)[:, None]
-    depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
-    found = allowed_density(fine, depression, torch.tensor([float(cast.n_cells)]))
-    return np.asarray(found[:, 0].numpy())
+    return np.asarray(allowed_density(fine, *limits(cast))[:, 0].numpy())
 
 
 def full_fields(coarse: NDArray[np.float32], cast: CastMould) -> NDArray[np.float32]:
     """Fields (n, 8, y, x) at a mould's resolution from block averages, as the physics allows."""
+    return np.asarray(project(deconvolve(torch.from_numpy(coarse), cast.pixels), *limits(cast)).numpy())
+
+
+@lru_cache(maxsize=8)
+def limits(cast: CastMould) -> tuple[Tensor, Tensor]:
+    """Where a mould's density may be (1, 1, y, x), and its number of cells (1,): for `project`."""
     depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
-    fine = deconvolve(torch.from_numpy(coarse), cast.pixels)
-    return np.asarray(project(fine, depression, torch.tensor([float(cast.n_cells)])).numpy())
+    return reachable(depression), torch.tensor([float(cast.n_cells)])
 
 
 def _mean(each: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Calibration
 from raptor.surrogate.constraints import project, with_sign
-from raptor.surrogate.ensemble import Ensemble, Realisations, full_fields
+from raptor.surrogate.ensemble import Ensemble, Realisations, full_fields, limits
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.out_of_distribution import descriptors
 from raptor.surrogate.prediction import Prediction
@@ -262,8 +262,7 @@ class Surrogate:
     def _obey(self, fields: Tensor, cast: CastMould) -> NDArray[np.float32]:
         """Fields (n, 8, y, x) at full resolution, projected onto the constraints unless they obey them."""
         if self.members[0].physical is None or self.architecture.pixels != self.pixels:
-            depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]
-            fields = project(fields, depression, torch.tensor([float(cast.n_cells)]))
+            fields = project(fields, *limits(cast))
         return np.asarray(fields.numpy())
 
 

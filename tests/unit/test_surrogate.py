@@ -136,7 +136,7 @@ def test_a_network_with_noise_learns_to_say_either_of_two_outcomes():
     with torch.no_grad():
         answers = learner.generator.answers(inputs[:1], torch.tensor([256.0]), 64, stream)[0, :, 1]
     means = answers.mean((1, 2))
-    # Over 16 trainings the share is 0.72 to 0.98; the rarer outcome has 3 to 48 % of the answers.
+    # Over 12 trainings the share is 0.69 to 0.98; the rarer outcome has 8 to 44 % of the answers.
     assert (means.abs() > 0.5).float().mean() > 0.6
     assert means.min() < -0.5
     assert means.max() > 0.5

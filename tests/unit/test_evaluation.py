@@ -85,7 +85,7 @@ def test_a_band_of_few_errors_is_wider_than_their_quantile():
     half = scale.bands(np.zeros(1), np.ones(1)).half[:, 0]
     assert half[0] == pytest.approx(10)
     assert half[2] == pytest.approx(19)
-    assert Bands(half[:, None]).hold(np.array([18.0])).ravel().tolist() == [False, False, True]
+    assert Bands(half[:, None], np.ones(1)).hold(np.array([18.0])).ravel().tolist() == [False, False, True]
 
 
 def test_descriptors_do_not_change_with_the_view_and_tell_a_bar_from_posts(stack):

@@ -10,6 +10,7 @@ whatever the distribution of the errors.
 
 import math
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,22 @@ TINY = 1e-9
 
 @dataclass(frozen=True)
 class Bands:
-    """Half widths (levels, ...) of bands that cover the shares `LEVELS` of simulations."""
+    """Bands that cover the shares `LEVELS` of simulations.
 
-    half: NDArray[np.float32]
+    Parameters
+    ----------
+    factors : ndarray (levels, n, 1, ...)
+        Half widths over sigma.
+    sigma : ndarray (n, ...)
+    """
+
+    factors: NDArray[np.floating]
+    sigma: NDArray[np.floating]
+
+    @cached_property
+    def half(self) -> NDArray[np.float32]:
+        """Half widths (levels, n, ...)."""
+        return (self.factors * self.sigma).astype(np.float32)
 
     def hold(self, error: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Whether an error (...) lies within each band, (levels, ...)."""
@@ -53,9 +67,9 @@ class ErrorScale:
 
     def bands(self, deviation: NDArray[np.floating], size: NDArray[np.floating]) -> Bands:
         """Bands of quantities with a deviation (n, ...) and size (n or 1, ...)."""
-        sigma = _sigma(np.array(self.irreducible), deviation, size)
+        sigma = _sigma(np.array(self.irreducible, deviation.dtype), deviation, size)
         factors = np.array(self.factors).reshape(len(LEVELS), -1, *(1,) * (deviation.ndim - 1))
-        return Bands((factors * sigma).astype(np.float32))
+        return Bands(factors, sigma)
 
 
 @dataclass(frozen=True)
@@ -139,8 +153,8 @@ def _conformal(ratio: NDArray[np.floating], level: float) -> float:
 
 
 def _sigma(
-    irreducible: NDArray[np.float64], deviation: NDArray[np.floating], size: NDArray[np.floating]
-) -> NDArray[np.float64]:
+    irreducible: NDArray[np.floating], deviation: NDArray[np.floating], size: NDArray[np.floating]
+) -> NDArray[np.floating]:
     """sqrt(deviation^2 + (irreducible size)^2) of quantities (n, ...)."""
     own = irreducible.reshape(-1, *(1,) * (deviation.ndim - 1)) * size
-    return np.asarray(np.sqrt(deviation.astype(np.float64) ** 2 + own**2 + TINY**2))
+    return np.asarray(np.sqrt(deviation**2 + own**2 + TINY**2))

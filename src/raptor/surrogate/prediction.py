@@ -207,11 +207,15 @@ class Prediction:
         return fields.assign_coords(added).assign(added_fields).assign_attrs(about)
 
     def __str__(self) -> str:
-        half = self.measure_bands.half[-1]
-        said = (
-            f"A/A0 {self.area_ratio:.3f} +- {half[0]:.3f}, w/w0 {self.width_ratio:.3f} +- {half[1]:.3f} "
-            f"(95 % bands, {self.layers} layers)"
-        )
+        names = ("A/A0", "w/w0", "alignment")
+        bands = zip(names, self.measures, self.measure_bands.half[-1], strict=False)
+        said = ", ".join(f"{name} {value:.3f} +- {half:.3f}" for name, value, half in bands)
+        said += f" (95 % bands, {self.layers} layers)"
+        known = self.held[np.isfinite(self.held)]
+        if known.size:
+            said += f"; {known.size - self.posts_lost} of {known.size} tethers held"
+        if 0.05 < known.min(initial=1.0) < 0.95:
+            said += f", the least sure by {known.min():.0%}"
         if self.out_of_distribution:
             said += (
                 f"\nunusual: {self.unusual}\n"

@@ -89,7 +89,7 @@ function ask(): void {
   wanted = "none";
   job += 1;
   asksOf.set(job, { key: keyOf(design), at: asked });
-  worker.postMessage({ kind: "predict", id: job, job: { mould: design.mould, cells: design.cells, whole, seed: 1, samples: SAMPLES } });
+  worker.postMessage({ kind: "predict", id: job, job: { mould: design.mould, cells: design.cells, whole, samples: SAMPLES } });
 }
 
 // ---- changes
@@ -213,13 +213,13 @@ function showStatus(isQuick: boolean): void {
     ? `Unusual: ${unusual}. Do not trust these numbers; simulate such a tissue.`
     : !result ? "The first prediction follows as soon as the networks are loaded."
     : isQuick ? "One image by one network, while you draw; bands follow when you let go."
-    : model.noise ? `Means of ${SAMPLES} samples, each a possible outcome; \u00b1 spans 95 % of them.`
+    : model.noise.length ? `Means of ${8 * model.members} samples, each a possible outcome; \u00b1 are 95 % bands for a single tissue.`
     : `Mean of ${model.members} networks and eight images each; \u00b1 are 95 % bands for a single tissue.`);
 }
 
 function showSamples(): void {
   const box = byId("samples"), samples = result?.found.samples ?? [];
-  box.hidden = !model.noise;
+  box.hidden = !model.noise.length;
   if (!samples.length || box.dataset.key === result!.key) {
     for (const [i, button] of [...box.children].entries()) button.setAttribute("aria-pressed", String(i === sample));
     return;
@@ -249,7 +249,7 @@ function setUp(): void {
     "Moulds of the library": model.moulds.map(({ name }) => [`mould ${name}`, words(name)]),
   });
   fillSelect(byId("tissue"), { "": [["", "your own"], ...fittedTissues.map(({ name }): [string, string] => [name, words(name)])] });
-  fillSelect(byId("field"), { "": VIEWS.filter(([name]) => name !== "band" || !model.noise) });
+  fillSelect(byId("field"), { "": VIEWS });
   byId("about").textContent = `RAPTOR ${model.version}, ${model.members} networks of training ${model.identity}, ${model.layers} layers of cells.`;
   const on = (id: string, event: string, act: (target: any) => void) => byId(id).addEventListener(event, ({ currentTarget }) => act(currentTarget));
   on("preset", "change", (select) => {

@@ -23,7 +23,7 @@ export interface Model {
   pixels: number;
   network_pixels: number;
   members: number;
-  noise: number;
+  noise: number[][][]; // of each member and image under D4, of networks that sample; otherwise empty
   physical: boolean; // whether the networks obey the constraints by construction
   clearance: number;
   threshold: number; // of predictions, calibrated
@@ -33,7 +33,7 @@ export interface Model {
   calibration: {
     levels: number[];
     fields: ErrorScale;
-    ratios: ErrorScale;
+    measures: ErrorScale;
     usual_disagreement: number;
     usual_distance: number;
     points: string; // of the training set, float32 in base64, a row of descriptors each

@@ -31,8 +31,8 @@ const decimal = (value: number) => (Number.isFinite(value) ? value.toFixed(3) : 
 const ROWS: Row[] = [
   { label: "A/A\u2080", title: "area of the tissue over that as cast", value: (n) => n.ratios[0], text: (n) => decimal(n.ratios[0]), band: (n) => n.bands && n.bands[0], low: 0, high: 1 },
   { label: "w/w\u2080", title: "width across the middle (dotted line) over that as cast", value: (n) => n.ratios[1], text: (n) => decimal(n.ratios[1]), band: (n) => n.bands && n.bands[1], low: 0, high: 1 },
-  { label: "alignment", title: "with the long side: 1 along it, -1 across", value: (n) => n.alignment, text: (n) => decimal(n.alignment), low: -1, high: 1 },
-  { label: "anisotropy", title: "local alignment in any direction, 0 to 1", value: (n) => n.anisotropy, text: (n) => decimal(n.anisotropy), low: 0, high: 1 },
+  { label: "alignment", title: "with the long side: 1 along it, -1 across", value: (n) => n.alignment, text: (n) => decimal(n.alignment), band: (n) => n.bands && n.bands[2], low: -1, high: 1 },
+  { label: "anisotropy", title: "local alignment in any direction, 0 to 1", value: (n) => n.anisotropy, text: (n) => decimal(n.anisotropy), band: (n) => n.bands && n.bands[3], low: 0, high: 1 },
   { label: "posts held", title: "posts and bars that the tissue encloses, of those that it enclosed as cast", value: () => NaN, text: heldText, low: 0, high: 1 },
   { label: "cells", title: "cells in all layers", value: () => NaN, text: (n) => n.cells.toLocaleString("en"), low: 0, high: 1 },
 ];

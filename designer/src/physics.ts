@@ -36,22 +36,22 @@ export function projectDensity(fields: Float32Array, there: Uint8Array, cells: n
   for (let p = 0; p < there.length; p++) fields[p] *= factor;
 }
 
-/** Eight fields projected onto the constraints (in place). */
-export function project(fields: Float32Array, there: Uint8Array, cells: number): Float32Array {
-  const size = there.length;
+/** Eight fields projected onto the constraints (in place); `trace`: see TRACE in raptor.surrogate.constraints. */
+export function project(fields: Float32Array, there: Uint8Array, cells: number, trace: number): Float32Array {
+  const size = there.length, least = (trace * cells) / there.reduce((sum, each) => sum + each, 0);
   projectDensity(fields, there, cells);
   const t = new Float64Array(6);
   for (let p = 0; p < size; p++) {
-    if (!there[p]) fields[size + p] = 0;
     const wanted = fields[p];
+    if (!(wanted > least)) fields[size + p] = 0;
     if (!(wanted > 0)) {
       for (let channel = XX; channel <= YZ; channel++) fields[channel * size + p] = 0;
       continue;
     }
     for (let k = 0; k < 6; k++) t[k] = fields[(XX + k) * size + p];
-    const trace = t[0] + t[1] + t[2];
-    if (trace > SMALL && isPositive(t)) {
-      for (let k = 0; k < 6; k++) t[k] *= wanted / trace;
+    const sum = t[0] + t[1] + t[2];
+    if (sum > SMALL && isPositive(t)) {
+      for (let k = 0; k < 6; k++) t[k] *= wanted / sum;
     } else mend(t, wanted);
     for (let k = 0; k < 6; k++) fields[(XX + k) * size + p] = t[k];
   }

@@ -19,10 +19,10 @@ export interface Networks {
 export interface Numbers {
   cells: number;
   ratios: [number, number];
-  bands: [number, number] | null; // half widths of the 95 % bands; null of one image
+  bands: number[] | null; // half widths of the 95 % bands of both ratios, alignment, anisotropy; null of one image
   alignment: number;
   anisotropy: number;
-  held: number[];
+  held: number[]; // chance that tissue encloses each tether
   distance: number;
   disagreement: number | null;
   unusual: string;
@@ -37,7 +37,7 @@ export interface Prediction {
   depressionPixels: number;
 }
 
-export interface Job { mould: Mould; cells: Cells; whole: boolean; seed: number; samples: number }
+export interface Job { mould: Mould; cells: Cells; whole: boolean; samples: number }
 
 /** Called between images; throws to give the work up. */
 export type Pause = () => Promise<void>;
@@ -60,7 +60,7 @@ export class Predictor {
     }
     const { cast } = this.last;
     const about = unusual(descriptors(cast, job.cells, this.model), this.model);
-    const found = this.model.noise ? await this.sampled(job, cast, pause) : await this.averaged(job, cast, pause);
+    const found = await this.ensemble(job, cast, pause);
     found.numbers.distance = about.distance;
     const { disagreement } = found.numbers;
     found.numbers.unusual = about.distance > 1 ? about.words
@@ -68,53 +68,53 @@ export class Predictor {
     return { ...found, density: cast.density, depressionPixels: cast.depression.reduce((sum, each) => sum + each, 0) };
   }
 
-  /** One mean of all networks and images under D4, or of one image by one network. */
-  private async averaged(job: Job, cast: Cast, pause: Pause) {
-    const { model } = this;
+  /** One mean of all networks and images under D4, or of one image by one network, and realisations about it. */
+  private async ensemble(job: Job, cast: Cast, pause: Pause) {
+    const { model } = this, sampled = model.noise.length > 0;
     const members = job.whole ? model.members : 1, images = job.whole ? this.elements : this.elements.slice(0, 1);
-    const answers: Float32Array[][] = [];
+    const raw: Float32Array[] = [], answers: Float32Array[][] = [];
     for (let member = 0; member < members; member++) {
       answers.push([]);
-      for (const element of images) {
+      for (const [k, element] of images.entries()) {
         if (job.whole) await pause();
-        answers[member].push(withoutSign(await this.answer(job, cast, member, element, null)));
+        const noise = sampled ? Float32Array.from(model.noise[member][k]) : null;
+        const answer = await this.answer(job, cast, member, element, noise);
+        if (raw.length < job.samples) raw.push(answer.slice());
+        answers[member].push(withoutSign(answer));
       }
     }
-    const fields = await this.finish(mean(answers.flat()), cast, true);
+    const middle = mean(answers.flat()), small = model.network_pixels ** 2;
+    const fields = await this.finish(middle, cast, true);
     const numbers = this.numbers(fields, cast);
+    [numbers.alignment, numbers.anisotropy] = alignmentAndAnisotropy(middle, cast, small);
     if (!job.whole) return { fields, deviation: null, samples: [], numbers };
-    const coarse = deviation(answers.flat());
-    const each: [number, number][] = [];
-    for (const own of answers) each.push(ratios(await this.density(mean(own), cast), cast, model));
-    numbers.bands = [0, 1].map((k) => band(model.calibration.ratios, k, spread(each.map((pair) => pair[k])), 1)) as [number, number];
-    const half = this.bands(coarse, fields);
+    const threshold = sampled ? model.cast_threshold : model.threshold;
+    const each: number[][] = [], enclosed: number[][] = [];
+    for (const own of sampled ? answers.flat() : answers.map(mean)) {
+      const density = await this.density(own, cast);
+      each.push([...ratios(density, cast, model, threshold), ...alignmentAndAnisotropy(own, cast, small)]);
+      enclosed.push(held(density, cast, model, threshold));
+    }
+    const columns = [0, 1, 2, 3].map((k) => each.map((row) => row[k]));
+    numbers.bands = columns.map((values, k) => band(model.calibration.measures, k, spread(values), 1));
+    numbers.held = enclosed[0].map((_, k) => average(enclosed.map((row) => row[k])));
+    if (sampled) {
+      const found = columns.map((values) => average(values.filter(Number.isFinite)));
+      [numbers.ratios, numbers.alignment, numbers.anisotropy] = [[found[0], found[1]], found[2], found[3]];
+    }
+    const half = this.bands(deviation(answers.flat()), fields);
     numbers.disagreement = disagreement(half.raw, fields, model);
-    return { fields, deviation: half.deviation, samples: [], numbers };
+    return { fields, deviation: half.deviation, samples: sampled ? await this.samples(raw, cast) : [], numbers };
   }
 
-  /** Samples, each with its own noise and image of D4; numbers are their means, bands twice their deviation. */
-  private async sampled(job: Job, cast: Cast, pause: Pause) {
-    const { model } = this, random = normals(job.seed), samples: { fields: Float32Array; numbers: Numbers }[] = [];
-    for (let k = 0; k < (job.whole ? job.samples : 1); k++) {
-      if (job.whole) await pause();
-      const element = this.elements[Math.floor(random.uniform() * 8)];
-      const noise = Float32Array.from({ length: model.noise }, () => random.normal());
-      const answer = await this.answer(job, cast, k % model.members, element, noise);
+  /** Possible tissues, with the numbers of each. */
+  private async samples(raw: Float32Array[], cast: Cast) {
+    const found: Prediction["samples"] = [];
+    for (const answer of raw) {
       const fields = await this.finish(answer, cast, false);
-      samples.push({ fields, numbers: this.numbers(fields, cast) });
+      found.push({ fields, numbers: this.numbers(fields, cast, this.model.cast_threshold) });
     }
-    const all = samples.map((sample) => sample.numbers), first = samples[0];
-    const known = (of: (each: Numbers) => number) => all.map(of).filter((value) => !Number.isNaN(value));
-    const average = (of: (each: Numbers) => number) => known(of).reduce((sum, value) => sum + value, 0) / known(of).length;
-    const numbers: Numbers = {
-      ...first.numbers,
-      ratios: [average((each) => each.ratios[0]), average((each) => each.ratios[1])],
-      alignment: average((each) => each.alignment),
-      anisotropy: average((each) => each.anisotropy),
-      held: first.numbers.held.map((_, k) => average((each) => each.held[k])),
-      bands: job.whole ? ([0, 1].map((k) => 1.96 * spread(known((each) => each.ratios[k]))) as [number, number]) : null,
-    };
-    return { fields: first.fields, deviation: null, samples: job.whole ? samples : [], numbers };
+    return found;
   }
 
   /** Fields of one image by one member, moved back, in physical units, on the networks' raster. */
@@ -142,7 +142,7 @@ export class Predictor {
     const { model } = this, whole = model.network_pixels === model.pixels;
     const fine = whole ? fields.slice() : await this.networks.refine(fields);
     if (magnitudes) withSign(fine, model.pixels ** 2);
-    return whole && model.physical ? fine : project(fine, this.last!.there, cast.cells);
+    return whole && model.physical ? fine : project(fine, this.last!.there, cast.cells, model.constants.TRACE);
   }
 
   private async density(fields: Float32Array, cast: Cast): Promise<Float32Array> {
@@ -152,12 +152,12 @@ export class Predictor {
     return fine;
   }
 
-  private numbers(fields: Float32Array, cast: Cast): Numbers {
+  private numbers(fields: Float32Array, cast: Cast, threshold = this.model.threshold): Numbers {
     const size = this.model.pixels ** 2, density = fields.subarray(0, size);
     const [alignment, anisotropy] = alignmentAndAnisotropy(fields, cast, size);
     return {
-      cells: cast.cells, ratios: ratios(density, cast, this.model), bands: null, alignment, anisotropy,
-      held: held(density, cast, this.model), distance: 0, disagreement: null, unusual: "",
+      cells: cast.cells, ratios: ratios(density, cast, this.model, threshold), bands: null, alignment, anisotropy,
+      held: held(density, cast, this.model, threshold), distance: 0, disagreement: null, unusual: "",
     };
   }
 
@@ -207,10 +207,14 @@ function deviation(images: Float32Array[]): Float32Array {
   return found;
 }
 
+function average(values: number[]): number {
+  return values.reduce((sum, value) => sum + value, 0) / values.length;
+}
+
 /** Standard deviation of some numbers; 0 of a single one. */
 function spread(values: number[]): number {
   if (values.length < 2) return 0;
-  const middle = values.reduce((sum, v) => sum + v, 0) / values.length;
+  const middle = average(values);
   return Math.sqrt(values.reduce((sum, v) => sum + (v - middle) ** 2, 0) / (values.length - 1)) || 0;
 }
 
@@ -220,17 +224,4 @@ function disagreement(deviation: Float32Array, fields: Float32Array, model: Mode
   for (let p = 0; p < size; p++) { square += deviation[p] ** 2; sum += fields[p]; squares += fields[p] ** 2; }
   const variance = squares / size - (sum / size) ** 2;
   return Math.sqrt(square / size) / (Math.sqrt(variance) + 1e-9) / model.calibration.usual_disagreement;
-}
-
-/** Random numbers of a seed (mulberry32). */
-function normals(seed: number) {
-  let state = seed >>> 0;
-  const uniform = () => {
-    state = (state + 0x6d2b79f5) >>> 0;
-    let t = Math.imul(state ^ (state >>> 15), 1 | state);
-    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
-    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
-  };
-  const normal = () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
-  return { uniform, normal };
 }

@@ -18,8 +18,8 @@ function reached(depth: Float32Array, open: Uint8Array): boolean {
 }
 
 /** A/A0 and w/w0 of a predicted density. */
-export function ratios(density: Image, cast: Cast, model: Model): [number, number] {
-  const tissue = filled(density, cast, model.threshold, model);
+export function ratios(density: Image, cast: Cast, model: Model, threshold = model.threshold): [number, number] {
+  const tissue = filled(density, cast, threshold, model);
   const before = asCast(cast, model);
   const area = areaAbove(tissue, model.pixels), length = lengthAbove(tissue, cast, model);
   return [
@@ -110,8 +110,8 @@ function lengthAbove(above: Image, cast: Cast, model: Model): number {
 }
 
 /** Whether tissue encloses each tether: 1 or 0; NaN if it does not as cast. */
-export function held(density: Image, cast: Cast, model: Model): number[] {
-  const now = free(density, model.constants.ENCLOSING * model.threshold, model.pixels);
+export function held(density: Image, cast: Cast, model: Model, threshold = model.threshold): number[] {
+  const now = free(density, model.constants.ENCLOSING * threshold, model.pixels);
   const before = free(cast.density, model.constants.ENCLOSING * model.cast_threshold, model.pixels);
   return cast.depths.map((depth) => (reached(depth, before) ? NaN : reached(depth, now) ? 0 : 1));
 }

@@ -53,7 +53,7 @@ def assert_same(numbers, prediction):
     """Whether the page says what `raptor predict` says."""
     assert numbers["cells"] == prediction.cast.n_cells
     assert numbers["ratios"] == pytest.approx(prediction.ratios, abs=1e-3)
-    assert numbers["bands"] == pytest.approx(prediction.ratio_bands.half[-1], abs=1e-3)
+    assert numbers["bands"] == pytest.approx(prediction.measure_bands.half[-1], abs=1e-3)
     assert numbers["alignment"] == pytest.approx(prediction.alignment, abs=1e-3)
     assert numbers["anisotropy"] == pytest.approx(prediction.anisotropy, abs=1e-3)
     assert numbers["distance"] == pytest.approx(prediction.distance, abs=1e-3)

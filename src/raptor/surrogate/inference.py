@@ -206,6 +206,11 @@ class Surrogate:
         """A/A0 and w/w0 (2,) of a predicted density (y, x)."""
         return shape_ratios(density, cast, self.threshold)
 
+    def noise(self, images: int) -> list[Tensor]:
+        """Of each network, noise (images, numbers) for as many images: the same in every prediction."""
+        stream = torch.Generator().manual_seed(0)
+        return [torch.randn(images, self.architecture.noise, generator=stream) for _ in self.members]
+
     def _images(self, cast: CastMould, elements: Sequence[Element]) -> list[NDArray[np.float32]]:
         """Masks (2, y', x') of a mould's images under D4 on the networks' raster."""
         masks = np.stack([cast.depression, cast.tethers]).astype(np.float32)
@@ -233,8 +238,7 @@ class Surrogate:
         same noise for every set of parameters, so that predictions change smoothly with these.
         """
         images = self._images(cast, elements)
-        places, stream = list(range(len(images))), torch.Generator().manual_seed(0)
-        noise = [torch.randn(len(images), self.architecture.noise, generator=stream) for _ in self.members]
+        places, noise = list(range(len(images))), self.noise(len(images))
         if not self.architecture.noise:  # of images that repeat, as a symmetric mould's do, one is enough
             numbers: dict[bytes, int] = {}
             places = [numbers.setdefault(masks.tobytes(), len(numbers)) for masks in images]

@@ -99,6 +99,7 @@ def _packed(content: bytes) -> bytes:
 
 def _about(surrogate: "Surrogate") -> dict[str, Any]:
     """What the page has to know besides the networks (designer/src/model.ts)."""
+    from raptor.surrogate.constraints import TRACE
     from raptor.surrogate.out_of_distribution import DESCRIPTORS
 
     calibration = surrogate.calibration
@@ -117,7 +118,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "pixels": surrogate.pixels,
         "network_pixels": surrogate.architecture.pixels,
         "members": len(surrogate.members),
-        "noise": surrogate.architecture.noise,
+        "noise": [own.tolist() for own in surrogate.noise(8)] if surrogate.architecture.noise else [],
         "physical": surrogate.members[0].physical is not None,
         "clearance": surrogate.clearance,
         "threshold": surrogate.threshold,
@@ -127,7 +128,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "calibration": calibration.as_json() | {"points": points},
         "descriptors": descriptors,
         "bounds": {name: {"lower": box.lower, "upper": box.upper} for name, box in BOUNDS.items()},
-        "constants": CONSTANTS,
+        "constants": CONSTANTS | {"TRACE": TRACE},
         "moulds": [
             {"name": name, "feature": read_mould(name).as_feature()} for name in MOULDS
         ],

@@ -6,7 +6,6 @@ paper's words, they would depend on where walls fall between rows of the lattice
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label, map_coordinates
 
 from raptor.frame import pixel_size
-from raptor.moulds.cast import CastMould, central_section, thin_parts
+from raptor.moulds.cast import CastMould, central_section, once_per_cast, thin_parts
 from raptor.moulds.geometry import CLEARANCE, Mould
 
 SAMPLES_PER_PIXEL = 4  # along a section
@@ -41,7 +40,7 @@ def shape_ratios(
     return np.array([area, _ratio(_length(tissue, [cast.central_section]), width)])
 
 
-@lru_cache(maxsize=8)
+@once_per_cast
 def _as_cast(cast: CastMould) -> tuple[float, float]:
     """Area, in pixels, and length on the central section, l0, of the tissue as cast."""
     before = filled(cast.density, cast)

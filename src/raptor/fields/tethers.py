@@ -1,14 +1,12 @@
 """Attachment of tissue to its tethers."""
 
-from functools import lru_cache
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from raptor.fields.shape import ENCLOSING, outside
-from raptor.moulds.cast import CastMould
+from raptor.moulds.cast import CastMould, once_per_cast
 from raptor.moulds.loops import centre_of, winding
 
 CONTACT = 1.5  # l0; tissue this near is in contact
@@ -66,7 +64,7 @@ def seen_held(
     return np.array([float(not free[mask].any()) if before else np.nan for mask, before in enclosed])
 
 
-@lru_cache(maxsize=8)
+@once_per_cast
 def _enclosed_as_cast(cast: CastMould) -> list[bool]:
     """Whether the tissue as cast encloses each tether."""
     free = outside(cast.density, ENCLOSING * cast.threshold)

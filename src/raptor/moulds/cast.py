@@ -3,9 +3,10 @@
 A prediction, an evaluation, a fit or a check makes one `CastMould` and passes it on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -19,7 +20,23 @@ from raptor.moulds.raster import MouldImage, mould_image, tether_depth
 from raptor.raster import density_image, density_threshold
 
 THIN = 4.0  # l0, 5.5 sigma
+Answer = TypeVar("Answer")
 HALF_SPAN = int(np.ceil(IMAGE_SIZE / 2))  # l0; no site of the image lies beyond
+
+
+def once_per_cast(compute: Callable[["CastMould"], Answer]) -> Callable[["CastMould"], Answer]:
+    """Keep what a function computes of a cast mould with that mould, as `cached_property` does."""
+
+    @wraps(compute)
+    def kept(cast: "CastMould") -> Answer:
+        known = cast.__dict__  # a frozen dataclass has one, and allows no other assignment
+        name = f"{compute.__module__}.{compute.__name__}"
+        if name not in known:
+            known[name] = compute(cast)
+        found: Answer = known[name]
+        return found
+
+    return kept
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What an ensemble of networks predicts of one tissue: a mean, and realisations that scatter about it."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -12,7 +12,7 @@ from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.resample import deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.fields.tethers import seen_held
-from raptor.moulds.cast import CastMould
+from raptor.moulds.cast import CastMould, once_per_cast
 from raptor.surrogate.constraints import allowed_density, project, reachable
 
 
@@ -45,8 +45,7 @@ class Realisations:
 
     def of_mean(self, threshold: float) -> NDArray[np.float64]:
         """The mean's `bands.MEASURED` (4,); `threshold` is the density above which there is tissue."""
-        (density,) = self._full(slice(1))
-        return np.array([*shape_ratios(density, self.cast, threshold), *self.directions[0]])
+        return np.array([*shape_ratios(self.mean_density, self.cast, threshold), *self.directions[0]])
 
     def estimate(self, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Estimates of `bands.MEASURED` (4,) and their standard deviations over realisations (4,)."""
@@ -61,6 +60,12 @@ class Realisations:
         """
         each = [seen_held(density, self.cast, threshold) for density in self._full(slice(1, None))]
         return np.asarray(np.mean(each, axis=0))
+
+    @cached_property
+    def mean_density(self) -> NDArray[np.float32]:
+        """The mean's density (y, x) at full resolution."""
+        (density,) = self._full(slice(1))
+        return np.asarray(density)
 
     def _full(self, which: slice) -> NDArray[np.float32]:
         """Densities (n, y, x) at full resolution."""
@@ -99,7 +104,7 @@ def full_fields(coarse: NDArray[np.float32], cast: CastMould) -> NDArray[np.floa
     return np.asarray(project(deconvolve(torch.from_numpy(coarse), cast.pixels), *limits(cast)).numpy())
 
 
-@lru_cache(maxsize=8)
+@once_per_cast
 def limits(cast: CastMould) -> tuple[Tensor, Tensor]:
     """Where a mould's density may be (1, 1, y, x), and its number of cells (1,): for `project`."""
     depression = torch.from_numpy(cast.depression.astype(np.float32))[None, None]

@@ -44,7 +44,7 @@ def untrained(folder, *, calibrated=True):
 
     architecture = Architecture(network="pix2pix", pixels=32, base_channels=4)
     scaling = Scaling((0.5,) * 8, (0.5,) * 8)
-    scales = [ErrorScale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 2)]
+    scales = [ErrorScale((0.1,) * n, ((1.0,) * n, (2.0,) * n, (3.0,) * n)) for n in (8, 4)]
     points = np.random.default_rng(0).normal(size=(9, len(DESCRIPTORS))).astype(np.float32)
     members = tuple(Generator(architecture, scaling) for _ in range(2))
     calibration = Calibration(*scales, 0.1, TrainingSet(points, 1e-3)) if calibrated else None

@@ -105,7 +105,7 @@ rule search_moulds:
         front=f"{RESULTS}/searches/{{search}}/front.csv",
         moulds=f"{RESULTS}/searches/{{search}}/designs.geojson",
         figure=report(
-            f"{RESULTS}/searches/{{search}}/front.png",
+            f"{RESULTS}/figures/front_{{search}}.png",
             category="Studies",
             labels={"campaign": "{search}", "what": "front"},
         ),

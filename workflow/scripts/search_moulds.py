@@ -12,6 +12,6 @@ with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     found = design(snakemake.input.spec, Path(snakemake.input.weights[0]).parent, log.info)
     folder = found.save(Path(snakemake.output.table).parent)
-    save(front_figure(found), folder / "front")
+    save(front_figure(found), Path(snakemake.output.figure).with_suffix(""))
     save(designs_figure(found), folder / "moulds_found")
     log.info("%s", found)

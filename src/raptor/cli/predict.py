@@ -42,6 +42,7 @@ def predict(
           --output tissue.nc --picture tissue.png
     """
     cells = opt.cell_parameters(delta, kappa_nnn, kappa_nnnn, tissue, tissues)
+    cells.require_sampled("prediction")
     shape = opt.read_mould(mould, scale, mm_per_l0, page)
     opt.require_writable(output, mould)
     opt.require_picture_writable(picture, mould, output)

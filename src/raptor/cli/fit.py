@@ -2,7 +2,7 @@
 
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -78,10 +78,8 @@ def fit(
 ) -> None:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Give a photograph of the tissue in its mould, one or both measured ratios, the name of a tissue of the
-    library, or its whole outline. Two ratios cannot determine three parameters; the intervals in the output
-    show what they leave open (docs/fits.md). Three simulations correct the surrogate's fit. With --by
-    simulator the search continues from there, or starts from given parameters without a surrogate.
+    Give a photograph, one or both ratios, a tissue of the library, or an outline. Three simulations correct
+    the surrogate's fit; --by simulator goes on from there, or from given parameters without a surrogate.
 
     Example:
       raptor fit glial_1 --tissue glial_1 --output fit.json
@@ -92,16 +90,14 @@ def fit(
       raptor fit mould.svg --outline tissue.png --by simulator --output fit.json
     """
     ratios, parameters = (area_ratio, width_ratio), (delta, kappa_nnn, kappa_nnnn)
-    if tissue is not None:
-        ratios = _measured(tissue, tissues, ratios)
+    ratios = ratios if tissue is None else _measured(tissue, tissues, ratios)
     start = None if parameters == (None, None, None) else opt.cell_parameters(*parameters)
     shape = opt.read_mould(mould, scale, mm_per_l0, page, layers)
     opt.require_writable(output, mould, outline, photo, kind="a JSON file")
     opt.require_picture_writable(picture, mould, outline, photo, output)
     opt.require_picture_writable(overlay, mould, outline, photo, output, picture)
-    photograph = None
-    if photo is not None or overlay is not None:
-        photograph = _photographed(photo, shape, overlay, ratios, outline)
+    photograph = _photographed(photo, shape, overlay, ratios, outline)
+    if photograph is not None:
         ratios = photograph.area_ratio, photograph.width_ratio if isfinite(photograph.width_ratio) else None
     with progress("fit", None) as advance:
         found = raptor.fit(
@@ -110,16 +106,24 @@ def fit(
         )  # fmt: skip
     found.save(output)
     opt.save_picture(found, picture, photograph=photograph)
-    numbers = found.numbers | {"mm_per_l0": shape.mm_per_l0, "output": output, "picture": picture}
-    sentence = f"{output}: {found}"
-    if photograph is not None:
-        apart = found.apart(photograph.outline)
-        numbers["outlines_apart"] = apart
-        sentence += f"\noutlines    {apart:.2f} l0 apart, root mean square, in the photograph and at the fit"
-    opt.report(sentence, numbers, as_json, _then(found, opt.words(mould, scale, mm_per_l0, page), picture))
+    sentence, numbers = _told(found, photograph)
+    numbers |= {"mm_per_l0": shape.mm_per_l0, "output": output, "picture": picture}
+    words = opt.words(mould, scale, mm_per_l0, page)
+    opt.report(f"{output}: {sentence}", numbers, as_json, _then(found, words))
 
 
-def _then(found: raptor.FittedTissue, mould: str, picture: Path | None) -> str:
+def _told(
+    found: raptor.FittedTissue, photograph: raptor.MeasuredPhotograph | None
+) -> tuple[str, dict[str, Any]]:
+    """A fit in words and in numbers, with how far its outline is from that in a photograph."""
+    if photograph is None:
+        return str(found), dict(found.numbers)
+    apart = found.apart(photograph.outline)
+    said = f"outlines    {apart:.2f} l0 apart, root mean square, in the photograph and at the fit"
+    return f"{found}\n{said}", found.numbers | {"outlines_apart": apart}
+
+
+def _then(found: raptor.FittedTissue, mould: str) -> str:
     """The next command: the whole tissue at the fit."""
     p = found.parameters
     point = f"--delta {p.delta:.4g} --kappa-nnn {p.kappa_nnn:.4g} --kappa-nnnn {p.kappa_nnnn:.4g}"
@@ -132,10 +136,12 @@ def _photographed(
     overlay: Path | None,
     given: tuple[float | None, float | None],
     outline: Path | None,
-) -> raptor.MeasuredPhotograph:
-    """What is measured in a photograph, and an overlay to check it by."""
+) -> raptor.MeasuredPhotograph | None:
+    """What is measured in a photograph, if one is given, and an overlay to check it by."""
     if photo is None:
-        raise raptor.RaptorError("--overlay shows what was measured in a photograph; give --photo too")
+        if overlay is not None:
+            raise raptor.RaptorError("--overlay shows what was measured in a photograph; give --photo too")
+        return None
     if given != (None, None) or outline is not None:
         raise raptor.RaptorError(ONE_KIND)
     measured = opt.measured(photo, mould, overlay)

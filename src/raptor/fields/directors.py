@@ -49,8 +49,19 @@ def directors(fields: NDArray[np.floating], threshold: float, squares: int = 32)
 
 def alignment(fields: NDArray[np.floating], cast: CastMould) -> float:
     """Alignment of cells with the mould from fields (8, y, x), -1 to 1: see `cell_alignment`."""
+    return alignment_along(fields, long_side(cast))
+
+
+def alignment_along(fields: NDArray[np.floating], angle: float) -> float:
+    """The same along a direction, as an angle from x in radians."""
     named = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
-    return _alignment(named["sxsx"], named["sysy"], named["sxsy"], cast)
+    return _alignment(named["sxsx"], named["sysy"], named["sxsy"], angle)
+
+
+def long_side(cast: CastMould) -> float:
+    """Direction of a mould's long side, radians from x."""
+    _, half = cast.long_axis
+    return float(np.arctan2(half[1], half[0]))
 
 
 def cell_alignment(orientation: NDArray[np.float64], cast: CastMould) -> float:
@@ -60,7 +71,7 @@ def cell_alignment(orientation: NDArray[np.float64], cast: CastMould) -> float:
     the plane; NaN where all cells stand upright.
     """
     sx, sy, _ = orientation.T
-    return _alignment(float(sx @ sx), float(sy @ sy), float(sx @ sy), cast)
+    return _alignment(float(sx @ sx), float(sy @ sy), float(sx @ sy), long_side(cast))
 
 
 def anisotropy(fields: NDArray[np.floating]) -> float:
@@ -73,10 +84,8 @@ def anisotropy(fields: NDArray[np.floating]) -> float:
     return _share(sizes.sum(), (named["sxsx"] + named["sysy"]).sum())
 
 
-def _alignment(sxsx: float, sysy: float, sxsy: float, cast: CastMould) -> float:
-    _, half = cast.long_axis
-    cosine, sine = half / np.hypot(*half)
-    along = (cosine**2 - sine**2) * (sxsx - sysy) + 4 * cosine * sine * sxsy
+def _alignment(sxsx: float, sysy: float, sxsy: float, angle: float) -> float:
+    along = np.cos(2 * angle) * (sxsx - sysy) + 2 * np.sin(2 * angle) * sxsy
     return _share(along, sxsx + sysy)
 
 

@@ -52,34 +52,28 @@ def fit(
 ) -> FittedTissue:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Two ratios cannot determine three parameters; the intervals show what they leave open (docs/fits.md). For
-    ratios the intervals are those of the posterior by the surrogate, corrected where simulations ended the
-    fit; for an outline they follow from the derivatives at the fit.
+    Intervals are those of the posterior (docs/fits.md), or for an outline follow from the derivatives.
 
     Parameters
     ----------
     mould : Mould, str or Path
-        A mould, or a library name or file for `read_mould`.
+        A mould, or what `read_mould` reads.
     area_ratio, width_ratio : float, optional
         Measured A/A0 and w/w0, one or both.
     outline : shapely Polygon or MultiPolygon, str or Path, optional
-        The tissue's outline (l0), such as from `measure`, instead of ratios; or a picture of it, cropped to
-        the frame of 62.5 l0.
+        The tissue's outline (l0) instead of ratios, or a picture of it, cropped to the frame of 62.5 l0.
     by : str
-        "corrected": by the surrogate, whose error at the fit a few simulations take away; "surrogate":
-        without these; "simulator": continue from there with simulations.
+        "surrogate"; "corrected": its error at the fit taken away by a few simulations; or "simulator".
     surrogate : Surrogate, str, Path or None
         A surrogate or its folder; None for the shipped one.
     start : CellParameters, optional
         Start of a fit by the simulator without a surrogate.
-    layers, accuracy : int, str
+    layers, accuracy, seed
         Of simulations, as in `simulate`; by default the surrogate's layers, or 7 without one.
     simulations : int, optional
         Largest number of simulations: 3 of a corrected fit, 40 of one by the simulator.
     error : float, optional
         Standard error of a ratio (0.01), or of the outline (0.25 l0).
-    seed : int
-        Of every random number.
     on_progress : callable, optional
         Called with a note after each step.
 
@@ -98,10 +92,17 @@ def fit(
     used = _surrogate(surrogate, layers) if start is None else None
     model = NetworkModel(used.layers if used is not None else layers or 7)
     simulator = Simulator(model, accuracy, used.pixels if used is not None else PIXELS, seed)
-    simulations = SIMULATIONS[by] if simulations is None else simulations
+    budget = _budget(simulations, by)
+    return _fit(Request(mould, target, simulator, used, start, by, budget, error, on_progress))
+
+
+def _budget(simulations: int | None, by: By) -> int:
+    """The largest number of simulations, checked."""
+    if simulations is None:
+        return SIMULATIONS[by]
     if simulations < 1 and by != "surrogate":
         raise RaptorError(f'simulations is {simulations}; give 1 or more, or by="surrogate"')
-    return _fit(Request(mould, target, simulator, used, start, by, simulations, error, on_progress))
+    return simulations
 
 
 def _start(start: CellParameters | None, by: str) -> CellParameters | None:

@@ -104,8 +104,8 @@ class Evaluator:
 
     @property
     def factor(self) -> float:
-        """The threshold of predicted density over that of simulated density."""
-        return self.surrogate.threshold / density_threshold(self.surrogate.layers, self.surrogate.pixels)
+        """The threshold of one network's or sample's density over that of simulated density."""
+        return self.surrogate.own_threshold / density_threshold(self.surrogate.layers, self.surrogate.pixels)
 
     def distance(self, cast: CastMould) -> float:
         """From mould and cells to the nearest of the training set, over the usual distance; 0 if unknown."""

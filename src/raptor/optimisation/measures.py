@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, radians, sin
+from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.directors import anisotropy
+from raptor.fields.directors import alignment_along, anisotropy, long_side
 from raptor.fields.resample import deconvolve
 from raptor.fields.shape import ENCLOSING, area_above, outside
 from raptor.frame import pixel_centres, pixel_size
@@ -17,7 +17,6 @@ from raptor.moulds.raster import tether_depth
 from raptor.optimisation.casting import count_cells
 from raptor.optimisation.spec import DIMENSION, Measured
 from raptor.raster import density_threshold
-from raptor.symmetry import FIELDS
 
 FINE = 128
 """Pixels along a side, at least, of images in which edges are looked for: 0.5 l0 each."""
@@ -104,13 +103,9 @@ def measure(
 
 
 def directed(fields: NDArray[np.floating], view: View, axis: str | float) -> float:
-    """Alignment along an axis, 1 to -1: the sum of (s.a)^2 - (s.b)^2 over that of (s.a)^2 + (s.b)^2."""
-    sums = dict(zip(FIELDS, fields.sum(axis=(1, 2), dtype=np.float64), strict=True))
-    _, half = view.cast.long_axis
+    """Alignment along an axis, 1 to -1: see `directors.alignment_along`."""
     turned = 0.0 if axis == "long" else 90.0 if axis == "short" else float(axis)
-    angle = 2 * (np.arctan2(half[1], half[0]) + radians(turned))
-    along = cos(angle) * (sums["sxsx"] - sums["sysy"]) + 2 * sin(angle) * sums["sxsy"]
-    return _share(along, sums["sxsx"] + sums["sysy"])
+    return alignment_along(fields, long_side(view.cast) + radians(turned))
 
 
 def evenness(fields: NDArray[np.floating], threshold: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raptor.core.arrays import Array, library_of
+from raptor.moulds.cast import CastMould
 
 
 def block_average(images: Array, pixels: int) -> Array:
@@ -19,6 +20,14 @@ def block_average(images: Array, pixels: int) -> Array:
         return images
     squares = images.reshape(*images.shape[:-2], pixels, ratio, pixels, ratio)
     return squares.mean((-3, -1))  # type: ignore[no-any-return]
+
+
+def coarse_masks(cast: CastMould, pixels: int) -> NDArray[np.float32]:
+    """Depression and tethers of a mould (2, pixels, pixels) as block averages, as networks are given them."""
+    masks: NDArray[np.float32] = block_average(
+        np.stack([cast.depression, cast.tethers]).astype(np.float32), pixels
+    )
+    return masks
 
 
 def deconvolve(images: Array, pixels: int) -> Array:

@@ -8,7 +8,6 @@ import shapely
 from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
-from raptor.fields.resample import block_average
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds.cast import HALF_SPAN, CastMould
 from raptor.moulds.geometry import CLEARANCE, Circle, Mould, Tether
@@ -82,8 +81,3 @@ def _within(tether: Tether, points: NDArray[np.float64], distance: float) -> NDA
         return np.asarray(tether.depth(points) > -distance)
     grown = tether.polygon.buffer(distance)
     return np.asarray(shapely.contains_xy(grown, points[:, 0], points[:, 1]))
-
-
-def masks(cast: CastMould, pixels: int) -> NDArray[np.float32]:
-    """Depression and tethers (2, y', x') as block averages, as networks see them."""
-    return block_average(np.stack([cast.depression, cast.tethers]).astype(np.float32), pixels)

@@ -13,7 +13,7 @@ from torch.nn.functional import interpolate
 from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.fields.metrics import without_sign
-from raptor.fields.resample import block_average, deconvolve
+from raptor.fields.resample import coarse_masks, deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import CLEARANCE, Mould
@@ -213,9 +213,8 @@ class Surrogate:
 
     def _images(self, cast: CastMould, elements: Sequence[Element]) -> list[NDArray[np.float32]]:
         """Masks (2, y', x') of a mould's images under D4 on the networks' raster."""
-        masks = np.stack([cast.depression, cast.tethers]).astype(np.float32)
-        averaged = block_average(masks, self.architecture.pixels)
-        return [np.ascontiguousarray(move_pixels(averaged, element)) for element in elements]
+        masks = coarse_masks(cast, self.architecture.pixels)
+        return [np.ascontiguousarray(move_pixels(masks, element)) for element in elements]
 
     def _inputs(
         self, cast: CastMould, cells: Sequence[CellParameters], images: Sequence[NDArray[np.float32]]
@@ -242,16 +241,11 @@ class Surrogate:
         if not self.architecture.noise:  # of images that repeat, as a symmetric mould's do, one is enough
             numbers: dict[bytes, int] = {}
             places = [numbers.setdefault(masks.tobytes(), len(numbers)) for masks in images]
-            images = [images[places.index(number)] for number in range(len(numbers))]
+            images, noise = [images[places.index(n)] for n in range(len(numbers))], self.noise(len(numbers))
         inputs, counts = self._inputs(cast, cells, images)
         with torch.no_grad():
             scaled = [
-                torch.cat(
-                    [
-                        member(*part)
-                        for part in _parts(inputs, counts, own[: len(images)].repeat(len(cells), 1))
-                    ]
-                )
+                torch.cat([member(*part) for part in _parts(inputs, counts, own.repeat(len(cells), 1))])
                 for member, own in zip(self.members, noise, strict=True)
             ]
         fields = torch.from_numpy(self.scaling.inverse(torch.stack(scaled, dim=1).numpy()))

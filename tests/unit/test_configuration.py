@@ -180,6 +180,20 @@ def test_without_models_campaigns_are_only_simulated():
         Configuration.model_validate({"selected_model": "none"})
 
 
+def test_a_trained_model_is_the_surrogate_beside_models_trained_here():
+    shipped = {"trained_model": "shipped"}
+    alone = Configuration.model_validate(shipped | {"campaigns": {"mine": {"moulds": "i_shape"}}})
+    assert (alone.models, alone.own_model, alone.surrogate) == ({}, None, "shipped")
+    beside = Configuration.model_validate(shipped | {"models": {"film_unet": {}}})
+    assert (beside.own_model, beside.surrogate) == ("film_unet", "shipped")
+    assert beside.surrogate_fingerprint != beside.model_fingerprint("film_unet")
+    elsewhere = beside.model_copy(update={"trained_model": "results/a/surrogate/film_unet"})
+    assert (elsewhere.surrogate, elsewhere.trained_folder.name) == ("trained", "film_unet")
+    for wrong in ({"models": {"shipped": {}}}, {"models": {"a": {}}, "selected_model": "a"}):
+        with pytest.raises(ValidationError, match="trained_model"):
+            Configuration.model_validate(shipped | wrong)
+
+
 def test_all_tissues_can_be_fitted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tissues = load_tissues()

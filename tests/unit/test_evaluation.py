@@ -197,6 +197,7 @@ def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
     costs = costs_of(surrogate, pd.DataFrame({"epoch": [0, 1], "seconds": [30.0, 30.0]}))
     assert costs["training_core_minutes"] == pytest.approx(1.0)
     assert costs["all_ms"] > 0
+    assert costs.keys() - costs_of(surrogate, None).keys() == {"epochs", "training_core_minutes"}
 
 
 def test_scores_tell_samples_of_the_truth_from_others():

@@ -64,6 +64,13 @@ def test_a_trained_model_serves_sweeps_and_fits_of_ones_own(workplace, tmp_path)
     assert not {"train_member", "assemble_model", "evaluate_model"} & set(
         place.jobs("all", configuration=path)
     )
+    drawn = {"runs": 6, "test": 2, "validation": 2}
+    compared = {"models": {"small": {}}, "campaigns": content["campaigns"] | {"paper": drawn}}
+    path.write_text(yaml.safe_dump(content | compared))
+    by_it = ["results/mine/evaluation/trained/metrics.json", "results/mine/evaluation/samples.nc"]
+    jobs = place.jobs(*by_it, configuration=path)
+    assert {"evaluate_model", "predict_samples"} <= jobs and "train_member" not in jobs
+    assert "train_member" in place.jobs("results/mine/evaluation/models.csv", configuration=path)
     path.write_text(yaml.safe_dump(content | {"layers": 3}))
     with pytest.raises(RaptorError, match="trained_model was made for 4; set layers: 4"):
         parsed(path)

@@ -43,7 +43,7 @@ CASES = CONFIG.tradeoff.cases
 wildcard_constraints:
     campaign="|".join(CAMPAIGNS),
     shard=r"\d+-\d+",
-    model="|".join([*MODELS, *BASELINES]),
+    model="|".join([*MODELS, *BASELINES, CONFIG.given_model or "none"]),
     member=r"\d+",
     tissue="|".join(TISSUES) or "none",
     case="|".join(CASES) or "none",

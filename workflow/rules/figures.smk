@@ -65,7 +65,7 @@ if MODELS:
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
             options={"campaign": CONFIG.main_campaign},
         ),
-        "training": dict(kind="training", inputs={"history": SURROGATE["history"][0]}),
+        "training": dict(kind="training", inputs={"history": OWN["history"][0]}),
         "calibration": dict(
             kind="calibration",
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
@@ -126,6 +126,10 @@ for tissue in TISSUES:
         },
     )
     simulator = rules.fit_by_simulator.output if tissue in BY_SIMULATOR else None
+    FIELD_FIGURES[f"tissue_{tissue}"] = dict(
+        kind="tissue",
+        inputs={"prediction": expand(fitted.prediction, tissue=tissue)[0]},
+    )
     FIELD_FIGURES[f"fit_{tissue}"] = dict(
         kind="fit",
         inputs={
@@ -245,8 +249,11 @@ rule fit:
         rules.tabulate_fits.output if FITTED else [],
         rules.fit_joint.output if JOINT else [],
         expand(rules.fit_outline.output, tissue=FITTED),
-        expand(f"{RESULTS}/figures/fit_{{tissue}}.png", tissue=FITTED),
-        expand(f"{RESULTS}/figures/valley_{{tissue}}.png", tissue=FITTED),
+        expand(
+            f"{RESULTS}/figures/{{kind}}_{{tissue}}.png",
+            kind=["tissue", "fit", "valley"],
+            tissue=FITTED,
+        ),
 
 
 rule figures:

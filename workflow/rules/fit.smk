@@ -10,7 +10,7 @@ rule fit_tissue:
     """Fit a tissue by the surrogate, correct the fit by a few simulations, and verify both."""
     input:
         mould=lambda wildcards: find_mould(TISSUES[wildcards.tissue].mould),
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         fit=f"{RESULTS}/fits/{{tissue}}.json",
@@ -62,7 +62,7 @@ rule infer_parameters:
     input:
         fit=rules.fit_tissue.output.fit,
         mould=rules.fit_tissue.input.mould,
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         posterior=f"{RESULTS}/fits/{{tissue}}_posterior.json",
@@ -92,7 +92,7 @@ rule fit_joint:
     input:
         fits=expand(rules.fit_tissue.output.fit, tissue=JOINT),
         moulds=[find_mould(TISSUES[tissue].mould) for tissue in JOINT],
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         fit=f"{RESULTS}/fits/joint.json",
@@ -121,7 +121,7 @@ rule fit_outline:
     input:
         tissue=rules.fit_tissue.output.tissue,
         mould=rules.fit_tissue.input.mould,
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
     output:
         fit=f"{RESULTS}/fits/{{tissue}}_outline.json",
     log:

@@ -8,7 +8,7 @@ rule publish:
     input:
         rules.campaigns.input,
         # `shipped/` and how it was trained.
-        model=[*rules.ship_model.output, *SURROGATE["history"]] if MODELS else [],
+        model=[*rules.ship_model.output, *OWN["history"]] if MODELS else [],
     output:
         manifest=f"{PUBLISHED}/SHA256SUMS",
     log:

@@ -9,7 +9,7 @@ rule predict_campaign:
     input:
         design=rules.design_campaign.output.design,
         moulds=rules.design_campaign.output.moulds,
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
     output:
         table=f"{STUDY}/predicted.csv",
         fields=f"{STUDY}/predicted.nc",
@@ -52,7 +52,7 @@ rule measure_tradeoff:
     input:
         mould=lambda wildcards: find_mould(CASES[wildcards.case].mould),
         surrogate=lambda wildcards: (
-            SURROGATE["weights"] if CONFIG.trial(wildcards.case)["surrogate"] else []
+            SURROGATE if CONFIG.trial(wildcards.case)["surrogate"] else []
         ),
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
@@ -94,7 +94,7 @@ rule search_moulds:
     """Search for moulds whose tissues do what a specification asks for, and simulate the best."""
     input:
         spec=lambda wildcards: CONFIG.searches[wildcards.search],
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
         kernels=ancient(rules.compile_kernels.output.kernels),
     output:
         table=report(

@@ -119,13 +119,22 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The surrogate: the model used for fits and figures, trained here or elsewhere.
-SURROGATE = {
-    name: expand(rules.assemble_model.output[name], model=CONFIG.surrogate or [])
+# The model trained here that is shipped, and the weights of the surrogate, which may be trained before.
+OWN = {
+    name: expand(rules.assemble_model.output[name], model=CONFIG.own_model or [])
     for name in ("weights", "model", "history")
 }
-if CONFIG.trained_folder:
-    SURROGATE["weights"] = [str(CONFIG.trained_folder / "weights.safetensors")]
+GIVEN = [CONFIG.given_model] if CONFIG.trained_folder else []
+
+
+def weights_of(model):
+    """The weights of a model, trained here or before; none of a baseline."""
+    if model in MODELS:
+        return expand(rules.assemble_model.output.weights, model=model)
+    return [str(CONFIG.trained_folder / "weights.safetensors")] if model in GIVEN else []
+
+
+SURROGATE = weights_of(CONFIG.surrogate)
 
 
 rule train:
@@ -169,9 +178,7 @@ rule evaluate_model:
         # A baseline predicts from the training split of the main campaign itself.
         training=expand(rules.build_stack.output.stack, campaign=MAIN),
         examples=expand(rules.list_examples.output.examples, campaign=MAIN),
-        weights=lambda wildcards: (
-            rules.assemble_model.output.weights if wildcards.model in MODELS else []
-        ),
+        weights=lambda wildcards: weights_of(wildcards.model),
     output:
         metrics=f"{RESULTS}/evaluation/{{model}}/campaigns/{{campaign}}.csv",
     log:
@@ -192,7 +199,7 @@ rule summarise_evaluation:
     input:
         metrics=lambda wildcards: expand(
             rules.evaluate_model.output.metrics,
-            campaign=CONFIG.tested if wildcards.model in MODELS else MAIN,
+            campaign=MAIN if wildcards.model in BASELINES else CONFIG.tested,
             allow_missing=True,
         ),
         floors=expand(
@@ -222,8 +229,12 @@ rule summarise_evaluation:
         "../scripts/summarise_evaluation.py"
 
 
+# Errors of the surrogate on the test runs, if there are models, whose campaigns have them.
 ERRORS = {
-    name: expand(rules.summarise_evaluation.output[name], model=CONFIG.surrogate or [])
+    name: expand(
+        rules.summarise_evaluation.output[name],
+        model=CONFIG.surrogate if MODELS else [],
+    )
     for name in ("metrics", "summary", "regions")
 }
 
@@ -232,10 +243,13 @@ rule compare_models:
     """Compare the cost and errors of all models in one table."""
     input:
         summaries=expand(
-            rules.summarise_evaluation.output.summary, model=[*MODELS, *BASELINES]
+            rules.summarise_evaluation.output.summary,
+            model=[*MODELS, *GIVEN, *BASELINES],
         ),
-        regions=expand(rules.summarise_evaluation.output.regions, model=MODELS),
-        weights=expand(rules.assemble_model.output.weights, model=MODELS),
+        regions=expand(
+            rules.summarise_evaluation.output.regions, model=[*MODELS, *GIVEN]
+        ),
+        weights=[*map(weights_of, [*MODELS, *GIVEN])],
         histories=expand(rules.assemble_model.output.history, model=MODELS),
     output:
         table=report(f"{RESULTS}/evaluation/models.csv", category="Surrogate"),
@@ -254,6 +268,7 @@ rule compare_models:
         mem_mb=2500,
     params:
         campaign=CONFIG.main_campaign,
+        models=[*MODELS, *GIVEN],
     script:
         "../scripts/compare_models.py"
 
@@ -264,7 +279,7 @@ rule predict_samples:
         stack=expand(rules.build_stack.output.stack, campaign=MAIN),
         moulds=expand(rules.design_campaign.output.moulds, campaign=MAIN),
         metrics=ERRORS["metrics"],
-        weights=SURROGATE["weights"],
+        weights=SURROGATE,
     output:
         samples=f"{RESULTS}/evaluation/samples.nc",
     log:
@@ -279,11 +294,15 @@ rule predict_samples:
 
 
 rule ship_model:
-    """Write the surrogate for the package: weights in half precision, and a model card."""
+    """Write a model trained here for the package: weights in half precision, and a model card."""
     input:
-        **SURROGATE,
-        summary=ERRORS["summary"],
-        regions=ERRORS["regions"],
+        **OWN,
+        summary=expand(
+            rules.summarise_evaluation.output.summary, model=CONFIG.own_model or []
+        ),
+        regions=expand(
+            rules.summarise_evaluation.output.regions, model=CONFIG.own_model or []
+        ),
     output:
         weights=f"{RESULTS}/shipped/weights.safetensors",
         model=f"{RESULTS}/shipped/model.json",
@@ -297,8 +316,8 @@ rule ship_model:
         mem_mb=1500,
     params:
         name=CONFIG.name,
-        model=CONFIG.surrogate,
-        campaigns=MODELS[CONFIG.surrogate].campaigns if MODELS else [],
+        model=CONFIG.own_model,
+        campaigns=MODELS[CONFIG.own_model].campaigns if MODELS else [],
     script:
         "../scripts/ship_model.py"
 

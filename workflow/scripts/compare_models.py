@@ -17,10 +17,12 @@ with logged(snakemake.log[0]):
     on_main = {name: summary[snakemake.params.campaign] for name, summary in summaries.items()}
     costs: dict[str, dict] = {name: {"model": name} for name in summaries}
     trained: dict[str, dict] = {}
-    for weights, history in zip(snakemake.input.weights, snakemake.input.histories, strict=True):
+    histories = {Path(file).parent.name: pd.read_csv(file) for file in snakemake.input.histories}
+    for name, weights in zip(snakemake.params.models, snakemake.input.weights, strict=True):
         folder = Path(weights).parent
-        trained[folder.name] = read_description(folder)["training"]
-        costs[folder.name] |= costs_of(load(folder), pd.read_csv(history))
+        costs[name] |= costs_of(load(folder), histories.get(name))
+        if name in histories:
+            trained[name] = read_description(folder)["training"]
     with atomic_path(Path(snakemake.output.table)) as path:
         compare(on_main, costs.values()).to_csv(path, index=False)
     with atomic_path(Path(snakemake.output.campaigns)) as path:

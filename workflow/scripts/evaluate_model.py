@@ -17,7 +17,7 @@ with logged(snakemake.log[0]):
         from raptor.surrogate.files import load
 
         torch.set_num_threads(snakemake.threads)
-        answer = predictor_of(load(Path(snakemake.input.weights).parent))
+        answer = predictor_of(load(Path(snakemake.input.weights[0]).parent))
     else:
         (training,), (examples,) = snakemake.input.training, snakemake.input.examples
         answer = baseline(snakemake.wildcards.model, Path(training), read_examples(Path(examples)))

@@ -40,7 +40,7 @@ class Configuration(Block):
 
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
-    layers: int = Field(4, ge=1, le=64, description="cell layers between floor and fill height")
+    layers: int = Field(7, ge=1, le=64, description="cell layers between floor and fill height")
     shells: tuple[int, int, int] = Field(
         (1, 2, 3), description="neighbour shells of kappa0, kappa_nnn and kappa_nnnn"
     )
@@ -50,13 +50,13 @@ class Configuration(Block):
     accuracy: Literal["draft", "standard", "reference"] = Field(
         "standard", description="accuracy of every simulation: draft, standard or reference"
     )
-    pixels: Literal[16, 32, 64, 128, 256, 512] = Field(128, description="side of the square images of fields")
+    pixels: Literal[16, 32, 64, 128, 256, 512] = Field(256, description="side of the square images of fields")
     shard_size: Positive = Field(4, description="simulations per job and file; does not change results")
     check_fraction: float = Field(
-        1.0, gt=0, le=1, description="random share of the simulations that checks recompute"
+        0.1, gt=0, le=1, description="random share of the simulations that checks recompute"
     )
     mould_scale: float = Field(
-        0.7, gt=0, le=1.1, description="library moulds are cast at this fraction of their size"
+        1.0, gt=0, le=1.1, description="library moulds are cast at this fraction of their size"
     )
     random_moulds: RandomMoulds = Field(default_factory=lambda: RandomMoulds())
     mould_families: MouldFamilies = Field(default_factory=lambda: MouldFamilies())
@@ -73,12 +73,13 @@ class Configuration(Block):
     )
     selected_model: Name | None = Field(
         None,
-        description="the surrogate: the model used for fits and figures; null: the first",
+        description="which of models is the surrogate, that of sweeps, fits and figures; null: the first",
     )
     trained_model: str | None = Field(
         None,
-        description="a trained surrogate for sweeps and fits, instead of training one: shipped, or a model's "
-        "folder; layers and pixels must be those it was made for, and models is empty",
+        description="a surrogate trained before, for sweeps, fits and figures: shipped, or a model's folder; "
+        "layers and pixels must be those it was made for. Models, if any, are trained and compared with it. "
+        "null: one of models",
     )
     fit: Fit = Field(default_factory=lambda: Fit())
     tradeoff: Tradeoff = Field(default_factory=lambda: Tradeoff())
@@ -113,8 +114,10 @@ class Configuration(Block):
             raise ValueError(
                 f"selected_model is '{self.selected_model}'; allowed are {', '.join(self.models)}"
             )
-        if self.trained_model is not None and self.models:
-            raise ValueError("trained_model: nothing is trained beside it; omit models")
+        if self.trained_model is not None and self.selected_model is not None:
+            raise ValueError("selected_model and trained_model both name the surrogate; omit one of them")
+        if self.given_model in self.models:
+            raise ValueError(f"models has '{self.given_model}', the name of trained_model; rename it")
         for name, campaign in self.campaigns.items():
             self._check_campaign(name, campaign)
         for name, model in self.models.items():
@@ -195,28 +198,40 @@ class Configuration(Block):
             raise ValueError(f"each of these depends on the next: {', '.join(error.args[1])}") from error
 
     @property
-    def surrogate(self) -> str | None:
-        """Name of the selected model; None without models."""
+    def own_model(self) -> str | None:
+        """Name of the model trained here that is shipped and published; None without models."""
         return self.selected_model or next(iter(self.models), None)
 
     @property
+    def given_model(self) -> str | None:
+        """Name of the model trained before, in tables and figures; None if none is used."""
+        if self.trained_model is None:
+            return None
+        return "shipped" if self.trained_folder == SHIPPED else "trained"
+
+    @property
+    def surrogate(self) -> str | None:
+        """Name of the model of sweeps, fits and figures, trained before or here; None without any."""
+        return self.given_model or self.own_model
+
+    @property
     def has_surrogate(self) -> bool:
-        """Whether there is a surrogate for sweeps and fits, trained here or elsewhere."""
-        return bool(self.models) or self.trained_model is not None
+        """Whether there is a surrogate for sweeps and fits."""
+        return self.surrogate is not None
 
     @property
     def trained_folder(self) -> Path | None:
-        """The folder of the trained model; None if none is used."""
+        """The folder of the model trained before; None if none is used."""
         if self.trained_model is None:
             return None
         return SHIPPED if self.trained_model == "shipped" else Path(self.trained_model)
 
     @property
     def surrogate_fingerprint(self) -> str | None:
-        """Hash of the configuration that the surrogate depends on; of its place, if trained elsewhere."""
-        if self.surrogate is None:
-            return content_hash(self.trained_model) if self.trained_model else None
-        return self.model_fingerprint(self.surrogate)
+        """Hash of the configuration that the surrogate depends on; of its place, if trained before."""
+        if self.trained_model is not None:
+            return content_hash(self.trained_model)
+        return self.model_fingerprint(self.own_model) if self.own_model else None
 
     @property
     def main_campaign(self) -> str | None:

@@ -43,7 +43,7 @@ GROUPS: dict[str, tuple[Element, ...]] = {
 class RandomMoulds(Block):
     """The distribution of random moulds."""
 
-    cells: tuple[Positive, Positive] = Field((500, 3000), description="bounds of the number of cells")
+    cells: tuple[Positive, Positive] = Field((3000, 6000), description="bounds of the number of cells")
     tethers: tuple[int, int] = Field((2, 16), description="bounds of the number of tethers")
 
     @model_validator(mode="after")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from raptor.core.files import atomic_path, read_json
 from raptor.dataset.netcdf import open_file
+from raptor.dataset.result import load_fields
 from raptor.dataset.shards import read_shard
 from raptor.dataset.stack import record_fields
 from raptor.fields.labelled import mould_of
@@ -30,6 +31,7 @@ from raptor.plotting.evaluation import (
 )
 from raptor.plotting.fits import fit_figure, valley_figure
 from raptor.plotting.sweep import contraction_figure, directors_figure, panels_figure
+from raptor.plotting.tissue import tissue_figure
 from raptor.raster import density_threshold
 from raptor.studies.coverage import coverage, describe_moulds, known_moulds
 from raptor.studies.outcomes import outcomes
@@ -204,6 +206,11 @@ def _fit(
     return fit_figure(mould, densities, thresholds, rows), _dataset(stacks)
 
 
+def _tissue(prediction: Path) -> Drawn:
+    fields = load_fields(prediction)
+    return tissue_figure(fields), fields
+
+
 def _simulated(shard: Path, pixels: int) -> NDArray[np.float32]:
     """Fields (8, y, x) of the one simulation of a shard."""
     (record,) = read_shard(shard).records
@@ -241,5 +248,6 @@ FIGURES: dict[str, Callable[..., Drawn]] = {
     "panels": _panels,
     "directors": _directors,
     "fit": _fit,
+    "tissue": _tissue,
 }
 """The function that draws each figure from the content of its files."""

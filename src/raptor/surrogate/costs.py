@@ -15,20 +15,22 @@ PARAMETERS = CellParameters(0.5, 0.4, 0.2)
 REPEATS = 5
 
 
-def costs_of(surrogate: Surrogate, history: pd.DataFrame) -> dict[str, float | str | int]:
-    """Number of weights, training time (one thread) and milliseconds per prediction of a model.
+def costs_of(surrogate: Surrogate, history: pd.DataFrame | None) -> dict[str, float | str | int]:
+    """Number of weights, training time (one thread, where a history is given) and milliseconds per prediction.
 
     Predictions of the eight fields in physical units: one image by one network, all eight images by one
     network, and those by all networks, on torch's threads; medians of a few.
     """
     one = replace(surrogate, members=surrogate.members[:1])
-    return {
+    training: dict[str, float | str | int] = {}
+    if history is not None:
+        training["epochs"] = int(history["epoch"].max()) + 1
+        training["training_core_minutes"] = float(history["seconds"].sum() / 60)
+    return training | {
         "network": surrogate.architecture.network,
         "pixels": surrogate.architecture.pixels,
         "ensemble_size": len(surrogate.members),
         "weights": surrogate.weights,
-        "epochs": int(history["epoch"].max()) + 1,
-        "training_core_minutes": float(history["seconds"].sum() / 60),
         "one_image_ms": _milliseconds(one, averaged=False),
         "eight_images_ms": _milliseconds(one, averaged=True),
         "all_ms": _milliseconds(surrogate, averaged=True),

@@ -54,7 +54,7 @@ class TrainingRules(Block):
         "null: train without one",
     )
     epochs: Positive = Field(
-        280, description="passes over the training runs, each in one of its images under D4, drawn at random"
+        120, description="passes over the training runs, each in one of its images under D4, drawn at random"
     )
     batch_size: int = Field(4, ge=2, description="examples per step")
     learning_rate: float = Field(

@@ -1,6 +1,7 @@
 """Least squares by a surrogate and by the simulator, and their tables."""
 
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -22,10 +23,12 @@ from raptor.fitting import (
     unit_of,
     write_fit,
 )
-from raptor.fitting.targets import as_array
+from raptor.fitting.targets import as_array, surrogate_measure
+from raptor.fitting.tissue import common_error
 from raptor.moulds import Mould
 from raptor.parameters import CellParameters, NetworkModel
-from tests.stand_ins import TRUTH, smooth
+from raptor.surrogate.files import load
+from tests.stand_ins import TRUTH, smooth, untrained
 
 BOX = Mould(shapely.box(-12, -6, 12, 6))
 
@@ -37,6 +40,16 @@ def test_a_fit_finds_a_tissue_and_says_what_is_not_determined():
     assert (fitted.area_ratio, fitted.width_ratio) == pytest.approx((area, width), abs=1e-3)
     assert fitted.rank == 2  # two numbers, three parameters
     fitted.parameters.require_sampled("fit")
+
+
+def test_the_error_common_to_a_mould_is_that_at_the_corrected_fit(tmp_path):
+    surrogate = load(untrained(tmp_path))
+    (predicted,) = surrogate_measure(surrogate, BOX, averaged=True)([TRUTH])
+    at_fit = {"area_ratio": predicted[0] + 0.02, "width_ratio": None}  # torn at its section
+    content = {"corrected": {"parameters": asdict(TRUTH)}, "corrected_simulation": at_fit}
+    area, width = common_error(surrogate, BOX, content)
+    assert area == pytest.approx(0.02)
+    assert np.isnan(width)
 
 
 def test_a_finer_model_refines_what_a_coarse_one_starts():

@@ -8,7 +8,7 @@ from raptor.core.jobs import logged
 from raptor.dataset.design import Run
 from raptor.dataset.result import save
 from raptor.dataset.shards import write_shard
-from raptor.fitting import Simulator, Target, fit_tissue, write_fit
+from raptor.fitting import PARAMETERS, Simulator, Target, fit_tissue, write_fit
 from raptor.moulds.reading import read_at_scale
 from raptor.parameters import CellParameters
 from raptor.surrogate.files import load
@@ -19,9 +19,9 @@ with logged(snakemake.log[0]):
     simulator = Simulator.configured(params.simulator)
     surrogate = load(Path(snakemake.input.weights[0]).parent)
     mould = read_at_scale(snakemake.input.mould, params.mould_scale)
-    found, simulation = fit_tissue(
-        surrogate, simulator, mould, Target(tissue["area_ratio"], tissue["width_ratio"])
-    )
+    target, paper = Target(tissue["area_ratio"], tissue["width_ratio"]), tissue["paper"]
+    published = CellParameters(*(paper[name] for name in PARAMETERS)) if PARAMETERS[0] in paper else None
+    found, simulation = fit_tissue(surrogate, simulator, mould, target, published=published)
     parameters = CellParameters(**found["surrogate"]["parameters"])
     first = Run(0, mould.name, "test", parameters, simulator.seed_of(1))
     path = Path(snakemake.output.tissue)

@@ -10,6 +10,7 @@ from raptor.core.files import atomic_path, read_json
 from raptor.core.jobs import logged, progress
 from raptor.fitting import PARAMETERS, Simulator, Target, infer, simulate_draws, summarise, survey, write_fit
 from raptor.fitting.experimental_design import DRAWS, rank_measurements
+from raptor.fitting.tissue import common_error
 from raptor.moulds.reading import read_at_scale
 from raptor.surrogate.files import load
 
@@ -18,7 +19,8 @@ with logged(snakemake.log[0]), progress("draws", DRAWS) as advance:
     params, fit = snakemake.params, read_json(Path(snakemake.input.fit))
     simulator, target = Simulator.configured(params.simulator), Target(**fit["target"])
     mould = read_at_scale(snakemake.input.mould, params.mould_scale)
-    found = survey(load(Path(snakemake.input.weights[0]).parent), mould, simulator.seed)
+    surrogate = load(Path(snakemake.input.weights[0]).parent)
+    found = survey(surrogate, mould, simulator.seed).shifted(common_error(surrogate, mould, fit))
     posterior = infer(found, target, simulator.seed)
     sampled = simulate_draws(posterior, simulator, mould, on_progress=advance)
     drawn = posterior.draws(1000, simulator.seed)

@@ -49,6 +49,8 @@ def _row(content: Mapping[str, Any], simulator: Mapping[str, Any] | None) -> dic
         row |= _columns("simulator", simulator["fit"], simulator["simulation"], simulator)
     if set(RATIOS) <= paper.keys():
         row["paper_simulation_rss"] = target.rss(np.array([paper[name] for name in RATIOS]))
+    if "published_simulation" in content:
+        row |= {f"paper_again_{key}": content["published_simulation"][key] for key in (*RATIOS, "rss")}
     return row | {f"paper_{key}": value for key, value in paper.items()}
 
 

@@ -5,12 +5,16 @@ from dataclasses import asdict
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import STARTS, Fit, minimise
 from raptor.fitting.simulator import ENOUGH, REPLICATES, Simulator, measure_again
 from raptor.fitting.space_mapping import correct
-from raptor.fitting.targets import Target, surrogate_measure
+from raptor.fitting.targets import RATIOS, Target, surrogate_measure
 from raptor.moulds.geometry import Mould
+from raptor.parameters import CellParameters
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
@@ -27,6 +31,7 @@ def fit_tissue(
     starts: int = STARTS,
     corrections: int = CORRECTIONS,
     replicates: int = REPLICATES,
+    published: CellParameters | None = None,
 ) -> tuple[Mapping[str, Any], Tissue]:
     """Both fits as JSON, and the first simulation, with a new seed, at the surrogate's fit.
 
@@ -38,6 +43,8 @@ def fit_tissue(
         Largest number of simulations for the correction.
     replicates : int
         Simulations with new seeds at each fit.
+    published : CellParameters, optional
+        Another fit, the paper's, to be simulated with the same new seeds.
     """
     begun = perf_counter()
     cast = surrogate.cast(mould)
@@ -50,7 +57,7 @@ def fit_tissue(
     at_fit, at_corrected = (
         simulator.replicates(mould, each.parameters, replicates) for each in (found, corrected)
     )
-    content = {
+    content: dict[str, Any] = {
         "target": asdict(target),
         "surrogate": asdict(Fit.at(found)),
         "simulation": measure_again(at_fit, simulator, mould, target),
@@ -58,4 +65,18 @@ def fit_tissue(
         "corrected_simulation": measure_again(at_corrected, simulator, mould, target),
         **seconds,
     }
+    if published is not None:
+        again = simulator.replicates(mould, published, replicates)
+        content["published_simulation"] = measure_again(again, simulator, mould, target)
     return content, at_fit[0]
+
+
+def common_error(surrogate: "Surrogate", mould: Mould, content: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Simulated less predicted ratios (2,) at the corrected fit of `fit_tissue`: the error common to a mould.
+
+    The surrogate's error varies slowly with the parameters, so that at the fit it holds for all of them.
+    """
+    at = CellParameters(**content["corrected"]["parameters"])
+    (predicted,) = surrogate_measure(surrogate, surrogate.cast(mould), averaged=True)([at])
+    simulated = [content["corrected_simulation"][name] for name in RATIOS]
+    return np.asarray(np.array(simulated, dtype=float) - predicted[: len(RATIOS)])

@@ -16,7 +16,7 @@ REPEATS = 5
 
 
 def costs_of(surrogate: Surrogate, history: pd.DataFrame | None) -> dict[str, float | str | int]:
-    """Number of weights, training time (one thread, where a history is given) and milliseconds per prediction.
+    """Number of weights, training time (one thread; with a history) and milliseconds per prediction.
 
     Predictions of the eight fields in physical units: one image by one network, all eight images by one
     network, and those by all networks, on torch's threads; medians of a few.

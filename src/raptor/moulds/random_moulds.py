@@ -1,4 +1,4 @@
-"""Random moulds with and without symmetry (paper, "Training Data"; Andrews & Hague 2023).
+"""Random moulds with and without symmetry (paper, "Training Data"; Andrews et al. 2023).
 
 An outline is a closed curve around the origin, r(angle), either a polygon through random corners or a smooth
 Fourier series. It is given a random symmetry, scaled to a random number of cells, and filled with small round

@@ -1,7 +1,9 @@
 """Prediction as a user asks for it."""
 
+import os
 from collections.abc import Sequence
-from functools import cache
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, partial
 from pathlib import Path
 from typing import overload
 
@@ -76,8 +78,10 @@ def predict(
     if not isinstance(surrogate, Surrogate):
         surrogate = load_surrogate(surrogate)
     cast = surrogate.cast(as_mould(mould))
-    predictions = [surrogate.examine(cast, point) for point in points]
-    return predictions if isinstance(cells, Sequence) else predictions[0]
+    if not isinstance(cells, Sequence):
+        return surrogate.examine(cast, points[0])
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:  # torch computes on one thread each
+        return list(pool.map(partial(surrogate.examine, cast), points))
 
 
 @cache

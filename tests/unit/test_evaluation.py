@@ -176,9 +176,9 @@ def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogat
 
 
 def test_evaluation_and_what_is_made_of_it(surrogate, moulds, stack):
-    metrics = evaluate(predictor_of(surrogate), stack, moulds, 2)
+    metrics = evaluate(predictor_of(surrogate), stack, moulds)
     assert len(metrics) == 2
-    truth = evaluate(lambda sample, mould: sample.fields, stack, moulds, 2)
+    truth = evaluate(lambda sample, mould: sample.fields, stack, moulds)
     assert (truth[[f"vrmse_{field}" for field in FIELDS]] == 0).all(axis=None)
     assert (truth["tether_error"].dropna() == 0).all()
     assert (truth["area_ratio_predicted"] == truth["area_ratio_simulated"]).all()
@@ -222,14 +222,14 @@ def test_the_noise_floor_is_the_error_of_the_mean_of_many_runs(made, stack, moul
     base = read_design(made / "design.csv"), moulds
     again = build(tmp_path / "again", 4, design("again", repeat_of="paper", runs=5, seeds=2, **DRAWN), base)
     repeats = again / "fields.nc"
-    floor = noise_floor(stack, repeats, moulds, 2)
+    floor = noise_floor(stack, repeats, moulds)
     assert floor["runs"].tolist() == [3, 3]
     # Another run scores sqrt 2 floors, in the mean over all pairs of runs.
     samples = list(read_samples(repeats, read_table(repeats).rows("test")))
     of_mould = {mould: [s.fields for s in samples if s.mould == mould] for mould in floor["mould"]}
-    other = evaluate(lambda sample, mould: of_mould[sample.mould][0], stack, moulds, 2)
+    other = evaluate(lambda sample, mould: of_mould[sample.mould][0], stack, moulds)
     assert 0.7 < in_floors(other, floor)["density"] / np.sqrt(2) < 1.4
-    perfect = evaluate(lambda sample, mould: sample.fields, stack, moulds, 2)
+    perfect = evaluate(lambda sample, mould: sample.fields, stack, moulds)
     assert in_floors(perfect, floor)["density"] == 0
 
 

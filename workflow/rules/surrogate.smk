@@ -164,8 +164,6 @@ rule measure_floor:
     threads: 1
     resources:
         mem_mb=1500,
-    params:
-        layers=CONFIG.layers,
     script:
         "../scripts/measure_floor.py"
 
@@ -188,8 +186,6 @@ rule evaluate_model:
     threads: 1
     resources:
         mem_mb=2500,
-    params:
-        layers=CONFIG.layers,
     script:
         "../scripts/evaluate_model.py"
 

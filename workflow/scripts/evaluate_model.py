@@ -23,8 +23,6 @@ with logged(snakemake.log[0]):
         answer = baseline(snakemake.wildcards.model, Path(training), read_examples(Path(examples)))
     stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))
     with progress("evaluation", len(read_table(stack).rows("test"))) as advance:
-        metrics = evaluate(
-            answer, stack, moulds, snakemake.params.layers, lambda s: advance(f"simulation {s}")
-        )
+        metrics = evaluate(answer, stack, moulds, lambda s: advance(f"simulation {s}"))
     with atomic_path(Path(snakemake.output.metrics)) as path:
         metrics.to_csv(path, index=False)

@@ -101,7 +101,6 @@ def evaluate(
     predict: Predictor,
     stack: Path,
     moulds: Mapping[str, Mould],
-    layers: int,
     on_progress: Callable[[int], None] = lambda simulation: None,
 ) -> pd.DataFrame:
     """Errors and measures of every test sample of a stack, one row each.
@@ -110,9 +109,9 @@ def evaluate(
     `tether_error`; each of `MEASURES`, simulated and predicted; with bands, the share of pixels that each
     covers (`cover95_density`), whether it covers A/A0 and w/w0, and the flag.
     """
-    rows = []
-    for sample in read_samples(stack, read_table(stack).rows("test")):
-        cast = CastMould(moulds[sample.mould], layers, sample.fields.shape[-1])
+    rows, table = [], read_table(stack)
+    for sample in read_samples(stack, table.rows("test")):
+        cast = CastMould(moulds[sample.mould], table.layers, table.pixels)
         guess = predict(sample, cast)
         prediction = guess.values if isinstance(guess, Prediction) else guess
         row: dict[str, Any] = {"simulation": sample.simulation, "mould": sample.mould}
@@ -154,7 +153,7 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
     }
 
 
-def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould], layers: int) -> pd.DataFrame:
+def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould]) -> pd.DataFrame:
     """Seed-to-seed noise of each repeated mould, one row each, with the columns of `evaluate`.
 
     Every pair of runs is compared as a prediction with its target; errors over sqrt 2 are those of the best
@@ -171,7 +170,7 @@ def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould], layers:
         row |= asdict(samples[0].parameters)
         errors = pd.DataFrame(pairs).drop(columns=[f"pearson_{field}" for field in FIELDS]).mean()
         row |= {str(name): float(value) / np.sqrt(2) for name, value in errors.items()}
-        cast = CastMould(moulds[mould], layers, samples[0].fields.shape[-1])
+        cast = CastMould(moulds[mould], table.layers, table.pixels)
         measured = pd.DataFrame([sample_measures(s.fields, cast) for s in samples])
         row |= {name: float(measured[name].std(ddof=1)) for name in MEASURES}
         rows.append(row)

@@ -11,9 +11,6 @@ from raptor.studies.evaluation import noise_floor
 
 with logged(snakemake.log[0]):
     stack, moulds = (Path(snakemake.input[name]) for name in ("stack", "moulds"))
-    tables = [
-        noise_floor(stack, Path(repeats), moulds_by_id(moulds))
-        for repeats in snakemake.input.repeats
-    ]
+    tables = [noise_floor(stack, Path(repeats), moulds_by_id(moulds)) for repeats in snakemake.input.repeats]
     with atomic_path(Path(snakemake.output.floor)) as path:
         pd.concat(tables).to_csv(path, index=False)

@@ -175,6 +175,25 @@ def test_training_learns_and_is_repeatable(training):
     assert same_weights(a, b)
 
 
+def test_normalisation_rests_on_many_batches_of_training_examples(training):
+    """The moments of the first layer are means over the batches seen at the end, equally weighted."""
+    seen = []
+    kept = torch.nn.BatchNorm2d.forward
+
+    def spied(self, features):
+        if self.momentum is None:
+            seen.append((id(self), features.mean((0, 2, 3))))
+        return kept(self, features)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(torch.nn.BatchNorm2d, "forward", spied)
+        generator = training(1, "settled.pt", network="film_unet", lambda_l1=None, batch_size=2).generator
+    first = next(module for module in generator.modules() if isinstance(module, torch.nn.BatchNorm2d))
+    means = torch.stack([mean for number, mean in seen if number == id(first)])
+    assert len(means) == int(first.num_batches_tracked) > 1
+    assert torch.allclose(first.running_mean, means.mean(0), atol=1e-5)
+
+
 def test_training_goes_on_from_the_weights_of_another(training):
     begun = training(3, "begun.pt")
     weights = begun.generator.state_dict()

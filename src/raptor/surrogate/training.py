@@ -28,6 +28,9 @@ SCORED = [FIELDS.index(field) for field in ("density", "sxsx", "sysy", "sxsy")]
 """Fields of the validation error: shape and alignment. The sign of sxsz and sysz is spontaneous, and tension
 nearly cancels where nothing pulls, so their errors say little about the network."""
 
+SETTLING = 128
+"""Batches from which the moments of batch normalisation are taken at the end."""
+
 VALIDATION_SAMPLES = 4
 """Samples of each validation example, for networks that sample."""
 
@@ -86,9 +89,9 @@ def train(
             torch.save(state, temporary)
         log.info("%s", ", ".join(f"{key} {value:.4g}" for key, value in row.items()))
         on_progress(epoch, row)
-    generator = learner.generator.cpu()
-    generator.load_state_dict(best)
-    return Trained(generator.eval(), pd.DataFrame(history))
+    learner.generator.load_state_dict(best)
+    _settle(learner.generator, training, rules.batch_size, seed, place)
+    return Trained(learner.generator.cpu().eval(), pd.DataFrame(history))
 
 
 def _prepare(device: str) -> torch.device:
@@ -144,6 +147,32 @@ def _train_epoch(
             f"training diverged in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
         )
     return row
+
+
+def _settle(
+    generator: Generator, examples: ExampleSet, batch_size: int, seed: int, device: torch.device
+) -> None:
+    """Take the moments of batch normalisation from many batches, instead of from the last few.
+
+    A few do not tell the moments of features that noise multiplies, and samples then come out wild (Wu and
+    Johnson 2021, arXiv:2105.07576).
+    """
+    norms = [module for module in generator.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    if not norms:
+        return
+    torch.manual_seed(seed % 2**63)
+    stream = torch.Generator().manual_seed(seed % 2**63)
+    order = examples.shuffled()[: SETTLING * batch_size]
+    generator.eval()
+    for norm in norms:
+        norm.reset_running_stats()
+        norm.momentum = None  # a mean over batches
+        norm.train()
+    with torch.no_grad():
+        for inputs, target in examples.batches(order, batch_size, device):
+            if len(inputs) > 1:
+                generator.answers(inputs, cells_of(target, examples.scaling), 1, stream)
+    generator.eval()
 
 
 def validation_error(

@@ -34,7 +34,7 @@ from raptor.surrogate.losses import (
 from raptor.surrogate.networks import NETWORKS, Discriminator
 from raptor.surrogate.networks.blocks import FilmNorm
 from raptor.surrogate.rules import Architecture, ModelRules, TrainingRules
-from raptor.surrogate.training import joined, train
+from raptor.surrogate.training import SETTLING, joined, train
 
 BOX = Mould(shapely.box(-10, -5, 10, 5))
 SCALING = Scaling((0.0,) * 8, (1.0,) * 8)
@@ -190,7 +190,7 @@ def test_normalisation_rests_on_many_batches_of_training_examples(training):
         generator = training(1, "settled.pt", network="film_unet", lambda_l1=None, batch_size=2).generator
     first = next(module for module in generator.modules() if isinstance(module, torch.nn.BatchNorm2d))
     means = torch.stack([mean for number, mean in seen if number == id(first)])
-    assert len(means) == int(first.num_batches_tracked) > 1
+    assert len(means) == int(first.num_batches_tracked) == SETTLING
     assert torch.allclose(first.running_mean, means.mean(0), atol=1e-5)
 
 

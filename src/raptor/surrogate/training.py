@@ -28,7 +28,7 @@ SCORED = [FIELDS.index(field) for field in ("density", "sxsx", "sysy", "sxsy")]
 """Fields of the validation error: shape and alignment. The sign of sxsz and sysz is spontaneous, and tension
 nearly cancels where nothing pulls, so their errors say little about the network."""
 
-SETTLING = 128
+SETTLING = 100
 """Batches from which the moments of batch normalisation are taken at the end."""
 
 VALIDATION_SAMPLES = 4
@@ -162,7 +162,10 @@ def _settle(
         return
     torch.manual_seed(seed % 2**63)
     stream = torch.Generator().manual_seed(seed % 2**63)
-    order = examples.shuffled()[: SETTLING * batch_size]
+    count = SETTLING * batch_size
+    order = [number for _ in range(-(-count // len(examples.images))) for number in examples.shuffled()][
+        :count
+    ]
     generator.eval()
     for norm in norms:
         norm.reset_running_stats()
@@ -170,8 +173,7 @@ def _settle(
         norm.train()
     with torch.no_grad():
         for inputs, target in examples.batches(order, batch_size, device):
-            if len(inputs) > 1:
-                generator.answers(inputs, cells_of(target, examples.scaling), 1, stream)
+            generator.answers(inputs, cells_of(target, examples.scaling), 1, stream)
     generator.eval()
 
 

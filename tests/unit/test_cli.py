@@ -114,7 +114,7 @@ def test_the_library_is_listed():
     assert [line.split()[0] for line in lines] == list(MOULDS)
     assert any("glial_1 53 x 26.5 l0 4 tethers" in " ".join(line.split()) for line in lines)
     lines = raptor("tissues").stdout.splitlines()
-    assert "glial_1       mould glial_1       A/A0 0.814, w/w0 0.797  Glial cells in collagen" in lines[0]
+    assert "glial_1       mould glial_1       A/A0 0.814, w/w0 0.797  Glial cells, G1" in lines[0]
     assert "not measured" in lines[-1]
 
 

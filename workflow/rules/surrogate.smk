@@ -119,22 +119,17 @@ rule assemble_model:
         "../scripts/assemble_model.py"
 
 
-# The model trained here that is shipped, and the weights of the surrogate, which may be trained before.
+# The model trained here that is shipped; the weights of every model, one of which may be trained before.
 OWN = {
     name: expand(rules.assemble_model.output[name], model=CONFIG.own_model or [])
     for name in ("weights", "model", "history")
 }
-GIVEN = [CONFIG.given_model] if CONFIG.trained_folder else []
-
-
-def weights_of(model):
-    """The weights of a model, trained here or before; none of a baseline."""
-    if model in MODELS:
-        return expand(rules.assemble_model.output.weights, model=model)
-    return [str(CONFIG.trained_folder / "weights.safetensors")] if model in GIVEN else []
-
-
-SURROGATE = weights_of(CONFIG.surrogate)
+WEIGHTS = {
+    name: expand(rules.assemble_model.output.weights, model=name) for name in MODELS
+}
+if CONFIG.trained_folder:
+    WEIGHTS[CONFIG.given_model] = [str(CONFIG.trained_folder / "weights.safetensors")]
+SURROGATE = WEIGHTS.get(CONFIG.surrogate, [])
 
 
 rule train:
@@ -176,7 +171,7 @@ rule evaluate_model:
         # A baseline predicts from the training split of the main campaign itself.
         training=expand(rules.build_stack.output.stack, campaign=MAIN),
         examples=expand(rules.list_examples.output.examples, campaign=MAIN),
-        weights=lambda wildcards: weights_of(wildcards.model),
+        weights=lambda wildcards: WEIGHTS.get(wildcards.model, []),
     output:
         metrics=f"{RESULTS}/evaluation/{{model}}/campaigns/{{campaign}}.csv",
     log:
@@ -240,12 +235,10 @@ rule compare_models:
     input:
         summaries=expand(
             rules.summarise_evaluation.output.summary,
-            model=[*MODELS, *GIVEN, *BASELINES],
+            model=[*WEIGHTS, *BASELINES],
         ),
-        regions=expand(
-            rules.summarise_evaluation.output.regions, model=[*MODELS, *GIVEN]
-        ),
-        weights=[*map(weights_of, [*MODELS, *GIVEN])],
+        regions=expand(rules.summarise_evaluation.output.regions, model=WEIGHTS),
+        weights=list(WEIGHTS.values()),
         histories=expand(rules.assemble_model.output.history, model=MODELS),
     output:
         table=report(f"{RESULTS}/evaluation/models.csv", category="Surrogate"),
@@ -264,7 +257,7 @@ rule compare_models:
         mem_mb=2500,
     params:
         campaign=CONFIG.main_campaign,
-        models=[*MODELS, *GIVEN],
+        models=list(WEIGHTS),
     script:
         "../scripts/compare_models.py"
 

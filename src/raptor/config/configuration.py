@@ -105,7 +105,8 @@ class Configuration(Block):
     def _consistent(self) -> "Configuration":
         assert self.network_model  # its shells are allowed
         side = IMAGE_SIZE - 2 * MARGIN
-        if self.random_moulds.cells[1] > 0.9 * side**2 * self.layers:
+        drawn = any(campaign.kind not in (None, "families") for campaign in self.campaigns.values())
+        if drawn and self.random_moulds.cells[1] > 0.9 * side**2 * self.layers:
             raise ValueError(
                 f"random_moulds.cells allows {self.random_moulds.cells[1]} cells, more than {self.layers} "
                 f"layers hold in an image of {IMAGE_SIZE} l0; lower it or raise layers"

@@ -252,6 +252,25 @@ def test_a_sampler_starts_from_a_network_that_gives_a_mean(training):
         ModelRules(network="fno", noise=4)
 
 
+def test_a_sampler_keeps_its_moments_in_the_second_half(training, monkeypatch):
+    """The first half of the steps normalises by the moments of each batch, the second by those of many."""
+    used = []
+    step = Learner.step
+
+    def spied(self, inputs, target):
+        first = self.generator.normalisations()[0]
+        before = first.running_mean.clone(), first.training
+        losses = step(self, inputs, target)
+        used.append((before[1], torch.equal(first.running_mean, before[0])))
+        return losses
+
+    monkeypatch.setattr(Learner, "step", spied)
+    trained = training(2, "kept.pt", network="film_unet", lambda_l1=None, noise=4)
+    half = len(used) // 2
+    assert used == [(True, False)] * half + [(False, True)] * half
+    assert int(trained.generator.normalisations()[0].num_batches_tracked) == SETTLING
+
+
 def test_samples_are_outcomes_of_their_own(model_folder):
     with pytest.raises(RaptorError, match="gives one mean"):
         load(model_folder).sample(BOX, CellParameters(0.5, 0.5, 0.3))

@@ -36,6 +36,10 @@ class Generator(nn.Module):
         noise = torch.randn(count, len(inputs), self.noise, generator=stream).to(inputs.device)
         return torch.stack([self(inputs, cells, each) for each in noise], dim=1)
 
+    def normalisations(self) -> list[nn.BatchNorm2d]:
+        """Layers of batch normalisation."""
+        return [module for module in self.modules() if isinstance(module, nn.BatchNorm2d)]
+
     def start_from(self, weights: Mapping[str, Tensor]) -> None:
         """Load the weights of another network, which may lack this one's noise.
 

@@ -37,6 +37,11 @@ class Learner:
     ----------
     seed : int
         Of the first weights.
+
+    Attributes
+    ----------
+    keeps_moments : bool
+        Whether batch normalisation uses the moments that it has, as in prediction, instead of each batch's.
     """
 
     def __init__(
@@ -50,6 +55,7 @@ class Learner:
         torch.manual_seed(seed)
         self.rules, self.scaling = rules, scaling
         self.generator = Generator(architecture, scaling)
+        self.keeps_moments = False
         networks: dict[str, nn.Module] = {"generator": self.generator}
         if rules.lambda_l1 is not None:
             networks["discriminator"] = Discriminator(architecture.pixels, architecture.base_channels)
@@ -70,6 +76,9 @@ class Learner:
             network.train()
             for group in self.optimisers[name].param_groups:
                 group["lr"] = rate
+        if self.keeps_moments:
+            for norm in self.generator.normalisations():
+                norm.eval()
 
     def step(self, inputs: Tensor, target: Tensor) -> Tensor:
         """Update the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""

@@ -78,10 +78,17 @@ def train(
     learner = Learner(architecture, training.scaling, rules, seed % 2**63, place)
     if initial_weights is not None:
         learner.generator.start_from(initial_weights)
+    # Noise multiplies features, so the moments of a batch are not those of all examples: networks that learn
+    # with the former alone give wild samples in prediction, some with 20 times the deviation.
+    keeping = rules.epochs // 2 if architecture.noise else rules.epochs
     history, best = _resume(learner, checkpoint, identity)
     for epoch in range(len(history), rules.epochs):
+        if epoch == keeping:
+            _settle(learner.generator, training, rules.batch_size, seed, place)
+        learner.keeps_moments = epoch >= keeping
         row = _train_epoch(learner, training, validation, seed, epoch, place)
-        if row["validation_error"] < min((r["validation_error"] for r in history), default=np.inf):
+        earlier = history[keeping:] if learner.keeps_moments else history
+        if row["validation_error"] < min((r["validation_error"] for r in earlier), default=np.inf):
             best = {k: v.detach().cpu().clone() for k, v in learner.generator.state_dict().items()}
         history.append(row)
         with atomic_path(checkpoint) as temporary:
@@ -90,7 +97,8 @@ def train(
         log.info("%s", ", ".join(f"{key} {value:.4g}" for key, value in row.items()))
         on_progress(epoch, row)
     learner.generator.load_state_dict(best)
-    _settle(learner.generator, training, rules.batch_size, seed, place)
+    if not learner.keeps_moments:
+        _settle(learner.generator, training, rules.batch_size, seed, place)
     return Trained(learner.generator.cpu().eval(), pd.DataFrame(history))
 
 
@@ -154,10 +162,9 @@ def _settle(
 ) -> None:
     """Take the moments of batch normalisation from many batches, instead of from the last few.
 
-    A few do not tell the moments of features that noise multiplies, and samples then come out wild (Wu and
-    Johnson 2021, arXiv:2105.07576).
+    See Wu and Johnson 2021 (arXiv:2105.07576).
     """
-    norms = [module for module in generator.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    norms = generator.normalisations()
     if not norms:
         return
     torch.manual_seed(seed % 2**63)

@@ -111,7 +111,7 @@ function lengthAbove(above: Image, cast: Cast, model: Model): number {
 
 /** Whether tissue encloses each tether: 1 or 0; NaN if it does not as cast. */
 export function held(density: Image, cast: Cast, model: Model, threshold = model.threshold): number[] {
-  const now = free(density, model.constants.ENCLOSING * threshold, model.pixels);
-  const before = free(cast.density, model.constants.ENCLOSING * model.cast_threshold, model.pixels);
+  const now = free(density, model.constants.OPEN * threshold, model.pixels);
+  const before = free(cast.density, model.constants.CLOSED * model.cast_threshold, model.pixels);
   return cast.depths.map((depth) => (reached(depth, before) ? NaN : reached(depth, now) ? 0 : 1));
 }

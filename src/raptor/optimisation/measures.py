@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from raptor.fields.directors import alignment_along, anisotropy, long_side
 from raptor.fields.resample import deconvolve
-from raptor.fields.shape import ENCLOSING, area_above, outside
+from raptor.fields.shape import area_above, outside
+from raptor.fields.tethers import OPEN
 from raptor.frame import pixel_centres, pixel_size
 from raptor.moulds.cast import CastMould
 from raptor.moulds.raster import tether_depth
@@ -145,7 +146,7 @@ def extent(along: NDArray[np.float64], tissue: NDArray[np.bool_]) -> float:
 
 def all_held(fields: NDArray[np.floating], view: View, threshold: float) -> bool:
     """Whether tissue encloses every tether: see `tethers.seen_held`."""
-    free = outside(fine_density(fields, view), ENCLOSING * threshold)
+    free = outside(fine_density(fields, view), OPEN * threshold)
     return not (view.posts & free).any()
 
 

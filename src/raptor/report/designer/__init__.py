@@ -17,7 +17,7 @@ import numpy as np
 from raptor.core.errors import RaptorError
 from raptor.core.files import write_text
 from raptor.core.version import __version__
-from raptor.fields import shape
+from raptor.fields import shape, tethers
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds import cast, geometry
 from raptor.moulds.library import MOULDS
@@ -42,7 +42,7 @@ CONSTANTS = {
     "STRICTLY": geometry.STRICTLY, "SMALLEST_TETHER": geometry.SMALLEST_TETHER,
     "TOUCHING": geometry.TOUCHING, "FITTED": geometry.FITTED, "CLEARANCE": geometry.CLEARANCE,
     "THIN": cast.THIN, "GAP": shape.GAP, "ENCLOSING": shape.ENCLOSING,
-    "SAMPLES_PER_PIXEL": shape.SAMPLES_PER_PIXEL,
+    "SAMPLES_PER_PIXEL": shape.SAMPLES_PER_PIXEL, "CLOSED": tethers.CLOSED, "OPEN": tethers.OPEN,
 }  # fmt: skip
 """Constants of the package that the page works by."""
 

@@ -78,7 +78,7 @@ def check(
     """Check a data set, a shard, a field stack or a mould against its rules; list every fault.
 
     Example:
-      raptor check results/laptop
+      raptor check results/laptop --part 0.1
       raptor check mould.svg
     """
     from raptor.dataset.check import check as find_faults
@@ -86,8 +86,9 @@ def check(
 
     if not path.exists():
         raise RaptorError(f"{path} does not exist; check the path")
-    with bar("check", None):
-        faults = find_faults(path, part, partial(read_mould, scale=scale, mm_per_l0=mm_per_l0, page=page))
+    read = partial(read_mould, scale=scale, mm_per_l0=mm_per_l0, page=page)
+    with bar("check", None) as advance:
+        faults = find_faults(path, part, read, advance)
     for fault in faults:
         typer.echo(fault)
     typer.echo(f"{path}: {len(faults)} faults" if faults else f"{path}: no faults")

@@ -41,11 +41,17 @@ UNDEFINED = ("area_ratio", "width_ratio", "held", "alignment")  # if there is no
 WALL_YIELD = 0.1  # l0; depth to which a soft wall yields
 
 
-def check(path: Path, fraction: float = 1.0, read: Callable[[Path], Mould] = read_mould) -> list[str]:
+def check(
+    path: Path,
+    fraction: float = 1.0,
+    read: Callable[[Path], Mould] = read_mould,
+    on_progress: Callable[[str], None] = lambda part: None,
+) -> list[str]:
     """Check a results folder, a campaign's folder, or a file: shard, stack, prediction, table, moulds.
 
     A file of one mould, of any format, is read by `read`.
-    Energy, tension and fields of a folder are recomputed for a random `fraction` of its simulations.
+    Energy, tension and fields of a folder are recomputed for a random `fraction` of its simulations; the
+    parts of a folder are told to `on_progress` as they begin.
 
     Returns
     -------
@@ -59,7 +65,7 @@ def check(path: Path, fraction: float = 1.0, read: Callable[[Path], Mould] = rea
     """
     path = Path(path)
     if path.is_dir():
-        return list(_check_folder(path, fraction))
+        return list(_check_folder(path, fraction, on_progress))
     if path.suffix.lower() in SUFFIXES and path.suffix != ".json":
         return _fault_of(lambda path: _cast_moulds(path, read), path)
     if path.suffix == ".csv":
@@ -94,15 +100,18 @@ def _fault_of(read: Callable[[Path], object], path: Path) -> list[str]:
     return []
 
 
-def _check_folder(folder: Path, fraction: float) -> Iterator[str]:
+def _check_folder(folder: Path, fraction: float, on_progress: Callable[[str], None]) -> Iterator[str]:
     """Every campaign of a results folder, or the one campaign of its own folder."""
     campaigns = campaign_folders(folder)
     if (folder / MANIFEST).is_file():
+        on_progress("checksums")
         yield from check_manifest(folder)
     for name, path in campaigns.items():
+        on_progress(name)
         yield from (f"{name}: {fault}" for fault in check_campaign(path, fraction))
     stacks = {name: path / "fields.nc" for name, path in campaigns.items()}
     if len(stacks) > 1:
+        on_progress("splits of all campaigns")
         yield from check_splits({name: path for name, path in stacks.items() if path.is_file()})
     for path in sorted(folder.glob("surrogate/*/normalisation.json")):
         yield from _check_scaling(path, stacks)

@@ -202,6 +202,19 @@ def test_what_cannot_be_measured_is_refused(pixels):
         register(as_picture(pixels, "picture"), MOULD, is_aligned=True)
 
 
+@pytest.mark.parametrize("case", CASES[:3], ids=lambda case: f"{case.mould}, tissue {case.camera.tissue}")
+def test_a_lamps_reflection_is_not_taken_for_tissue(case):
+    """It is refused unless the threshold is given; the third of these was measured as all of the tissue."""
+    mould, tissue, _ = case.made()
+    shown = photograph(mould, tissue, replace(case.camera, glare=2.0))
+    with pytest.raises(RaptorError, match="three surfaces.*reflection, turn the lamp"):
+        measured(shown, mould)
+    level = (case.camera.floor + case.camera.tissue) / 2
+    look = Appearance.BRIGHT if case.camera.tissue > case.camera.floor else Appearance.DARK
+    found = measured(shown, mould, tissue=look, threshold=level)
+    assert found.area_ratio == pytest.approx(outline_ratios(tissue, mould)[0], abs=0.03)
+
+
 @pytest.mark.parametrize("width", [0.4, 0.8])
 def test_a_wall_seen_as_a_band_is_refused_and_measured_by_landmarks(width):
     walled = replace(CAMERA, wall=width)

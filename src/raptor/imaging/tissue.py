@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
-from skimage.filters import threshold_otsu
+from skimage.filters import threshold_multiotsu, threshold_otsu
 from skimage.measure import find_contours
 
 from raptor.core.errors import RaptorError
@@ -28,6 +28,7 @@ DEGREE = 4  # of the illumination's polynomial, where surfaces are known everywh
 MIN_CONTRAST = (
     4.0  # standard deviations; the halves of Gaussian noise differ by 2.7, of a uniform spread by 3.5
 )
+BETWEEN = 0.15  # of the pixels; more than edges have, whose brightness lies between two surfaces
 RIM_BAND = 1.5  # l0 along the rim, where a contracting tissue leaves the floor bare
 MAX_OUTSIDE = 0.05  # share of a mask's tissue
 PLATE, FIRST, SECOND = 0, 1, 2  # labels of surfaces; which of the last two is tissue is decided later
@@ -192,14 +193,34 @@ def _threshold(seen: NDArray[np.float64], given: float | None) -> tuple[float, f
             f"threshold is {level:.3g}; brightness in the depression runs from {seen.min():.3g} to "
             f"{seen.max():.3g} of the plate's; choose a value between"
         )
-    within = np.sqrt(above.mean() * seen[above].var() + (~above).mean() * seen[~above].var())
-    contrast = float((seen[above].mean() - seen[~above].mean()) / within)
+    contrast = _contrast(seen[~above], seen[above])
     if given is None and contrast < MIN_CONTRAST:
         raise RaptorError(
             f"tissue and floor cannot be told apart: their contrast is {contrast:.1f} standard deviations "
             f"({MIN_CONTRAST} are needed); improve the lighting, give a mask, or set --threshold"
         )
+    if given is None:
+        _require_two_surfaces(seen)
     return level, contrast
+
+
+def _contrast(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> float:
+    """Difference of the means of two sets of pixels, over the standard deviation within them."""
+    within = (dark.size * dark.var() + bright.size * bright.var()) / (dark.size + bright.size)
+    return float((bright.mean() - dark.mean()) / np.sqrt(within))
+
+
+def _require_two_surfaces(seen: NDArray[np.float64]) -> None:
+    """Refuse a third surface, as a lamp's reflection is, which may be taken for the tissue."""
+    low, high = threshold_multiotsu(seen, 3)
+    parts = [seen[seen <= low], seen[(seen > low) & (seen <= high)], seen[seen > high]]
+    least = min(_contrast(parts[0], parts[1]), _contrast(parts[1], parts[2]))
+    if least > MIN_CONTRAST and parts[1].size > BETWEEN * seen.size:
+        levels = ", ".join(f"{part.mean():.2g} ({100 * part.size / seen.size:.0f} %)" for part in parts)
+        raise RaptorError(
+            f"the depression shows three surfaces, of {levels} of the plate's brightness; if one is a lamp's "
+            "reflection, turn the lamp; give a mask, or say by --threshold what is tissue"
+        )
 
 
 def _look(above: NDArray[np.bool_], inside: NDArray[np.bool_], band: NDArray[np.bool_]) -> Appearance:

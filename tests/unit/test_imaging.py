@@ -207,7 +207,7 @@ def test_a_lamps_reflection_is_not_taken_for_tissue(case):
     """It is refused unless the threshold is given; the third of these was measured as all of the tissue."""
     mould, tissue, _ = case.made()
     shown = photograph(mould, tissue, replace(case.camera, glare=2.0))
-    with pytest.raises(RaptorError, match="three surfaces.*reflection, turn the lamp"):
+    with pytest.raises(RaptorError, match=r"three surfaces.*reflection, turn the lamp"):
         measured(shown, mould)
     level = (case.camera.floor + case.camera.tissue) / 2
     look = Appearance.BRIGHT if case.camera.tissue > case.camera.floor else Appearance.DARK

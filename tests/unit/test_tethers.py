@@ -81,7 +81,7 @@ def test_a_tether_at_the_outline_has_no_loop_but_contact():
 
 @pytest.mark.parametrize(("gap", "encircled"), [(0.2, False), (0.5, False), (2.0, True), (3.0, True)])
 def test_an_image_shows_the_tethers_that_have_room_for_a_row_of_cells(gap, encircled):
-    """A gap narrower than a row of sites may look closed at a low density; nothing encircles such a tether."""
+    """A gap narrower than a row of sites may look closed at a low density; nothing encircles that tether."""
     cast = CastMould(Mould(shapely.box(-8, -6, 8, 6), (Circle(0, 6 - 1.5 - gap, 1.5),)), 4, 256)
     for shares in (held(cast.sites, cast), seen_held(cast.density, cast)):
         assert np.isfinite(shares[0]) == encircled

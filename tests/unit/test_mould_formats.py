@@ -342,6 +342,12 @@ def test_white_spots_and_tethers_at_the_wall(tmp_path):
     assert mould.depression.area == pytest.approx((3600 - 200) * 0.625**2, rel=0.01)
 
 
+def test_a_folder_does_not_hide_a_library_mould(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fibroblast").mkdir()
+    assert read_mould("fibroblast").name == "fibroblast"
+
+
 def test_other_suffixes_and_folders(tmp_path):
     path = tmp_path / "mould.step"
     with pytest.raises(RaptorError, match="does not exist"):

@@ -17,19 +17,21 @@ SUFFIXES = (".geojson", ".json", ".svg", ".svgz", ".dxf", *PICTURES)
 def find_mould(name: str | Path) -> Path:
     """The file of a mould: the given path, or that of the library mould of this name.
 
+    A folder does not hide a library mould of its name.
+
     Raises
     ------
     RaptorError
         If there is neither.
     """
     path = Path(name)
+    if str(name) in MOULDS and not path.is_file():
+        return MOULDS[str(name)]
     if path.suffix or path.exists():
         return path
-    if str(name) not in MOULDS:
-        near = get_close_matches(str(name), MOULDS, 1)
-        hint = f"did you mean '{near[0]}'?" if near else f"the library has {', '.join(MOULDS)}"
-        raise RaptorError(f"mould '{name}' is neither a file nor a mould of the library; {hint}")
-    return MOULDS[str(name)]
+    near = get_close_matches(str(name), MOULDS, 1)
+    hint = f"did you mean '{near[0]}'?" if near else f"the library has {', '.join(MOULDS)}"
+    raise RaptorError(f"mould '{name}' is neither a file nor a mould of the library; {hint}")
 
 
 def as_mould(mould: Mould | str | Path) -> Mould:

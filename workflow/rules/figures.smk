@@ -94,7 +94,12 @@ if MODELS:
         TABLE_FIGURES["learning"] = dict(
             kind="learning", inputs={"table": rules.compare_models.output.campaigns}
         )
-    tuned = [name for name, model in MODELS.items() if model.initial_weights]
+    tuned = [
+        name
+        for name, model in MODELS.items()
+        if model.initial_weights
+        and model.campaigns != MODELS[model.initial_weights].campaigns
+    ]
     if tuned:
         TABLE_FIGURES["active_learning"] = dict(
             kind="active_learning",

@@ -299,7 +299,7 @@ def test_the_search_sees_what_predict_sees(surrogate):
     cells = raptor.tissue("glial_1").fit
     values = evaluator.values([surrogate.cast(mould)], 8 * len(surrogate.members))
     prediction = raptor.predict(mould, cells)
-    assert values["alignment"].mean() == pytest.approx(prediction.alignment, abs=0.01)
+    assert values["alignment"].mean() == pytest.approx(prediction.alignment, abs=1e-4)
     assert values["distance"][0, 0] == pytest.approx(prediction.distance)
 
 

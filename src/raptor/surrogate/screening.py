@@ -23,7 +23,7 @@ def outcomes(
 
     Each of the `count` outcomes is one network's answer to one image under D4, moved back: networks take
     turns, each with images of its own; eight times the networks are all. Networks that sample give one
-    sample each.
+    sample each, of the noise that predictions have there, so moulds are compared under equal chances.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def outcomes(
         If the parameters are out of the range that was sampled.
     """
     parameters.require_sampled("prediction")
-    pixels, stream = surrogate.architecture.pixels, torch.Generator().manual_seed(0)
+    pixels, noise = surrogate.architecture.pixels, surrogate.noise(len(Element.all()))
     totals = torch.tensor(cells, dtype=torch.float32) * (pixels / surrogate.pixels) ** 2
     found = np.empty((len(masks), count, 8, pixels, pixels), np.float32)
     for number in range(count):
@@ -50,8 +50,9 @@ def outcomes(
             inputs = torch.from_numpy(
                 np.stack([scale_inputs(depression, tethers, parameters) for depression, tethers in moved])
             )
+            own = noise[member][element.index].expand(len(inputs), -1)
             with torch.no_grad():
-                scaled = surrogate.members[member].answers(inputs, totals[part], 1, stream)[:, 0]
+                scaled = surrogate.members[member](inputs, totals[part], own if own.shape[1] else None)
             fields = surrogate.scaling.inverse(scaled.numpy())
             found[part, number] = apply(fields, element.inverse)
     return found

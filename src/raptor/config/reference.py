@@ -13,7 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import write_text
 
 DEFAULTS_HEAD = """\
-# The default run: 64 simulations, a surrogate beside the shipped one, and a fit, in about eight
+# The default run: 64 simulations, a surrogate beside the shipped one, and a fit, in about six
 # minutes on two cores. All keys have their defaults but trained_model (null), and config/README.md explains
 # them. Written by `raptor reference`.
 """

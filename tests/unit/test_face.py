@@ -25,6 +25,12 @@ def test_importing_raptor_loads_nothing_heavy():
     assert done.stdout == "[] RAPTOR\n"
 
 
+def test_the_command_line_loads_only_what_a_command_needs():
+    script = f"import raptor.cli, sys; print({set(HEAVY) - {'numpy', 'typer'}} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
 def test_every_name_of_the_face_is_there_and_documented():
     stub = ast.parse((ROOT / "src" / "raptor" / "__init__.pyi").read_text())
     (listed,) = (ast.literal_eval(node.value) for node in stub.body if isinstance(node, ast.Assign))

@@ -285,7 +285,7 @@ def test_samples_are_outcomes_of_their_own(model_folder):
     found = surrogate.ensemble(BOX, CellParameters(0.5, 0.5, 0.3)).realisations
     densities = full_density(found.densities[1:], found.cast)
     threshold = float(densities.max()) / 4  # these untrained networks spread cells thinly
-    estimate, deviations = found.estimate(threshold)
+    estimate, deviations, _ = found.measure(threshold)
     each = [shape_ratios(density, found.cast, threshold) for density in densities]
     assert len(each) == 2 * 8
     assert estimate[:2] == pytest.approx(np.mean(each, axis=0))

@@ -38,6 +38,7 @@ CAMPAIGNS = CONFIG.campaigns
 MODELS = CONFIG.models
 SWEEPS = [name for name, campaign in CAMPAIGNS.items() if campaign.grid]
 CASES = CONFIG.tradeoff.cases
+SIMULATOR = {**CONFIG.simulator, "pixels": CONFIG.pixels, "seed": CONFIG.seed}
 
 
 wildcard_constraints:

@@ -65,7 +65,11 @@ if MODELS:
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
             options={"campaign": CONFIG.main_campaign},
         ),
-        "training": dict(kind="training", inputs={"history": OWN["history"][0]}),
+        "training": dict(
+            kind="training",
+            inputs={"history": OWN["history"][0]},
+            options={"means_until": CONFIG.means_until(CONFIG.own_model)},
+        ),
         "calibration": dict(
             kind="calibration",
             inputs={"metrics": errors["metrics"], "summary": errors["summary"]},
@@ -81,7 +85,7 @@ if MODELS:
                 "table": rules.compare_models.output.table,
                 "histories": expand(rules.assemble_model.output.history, model=MODELS),
             },
-            options={"models": list(MODELS)},
+            options={"models": {name: CONFIG.means_until(name) for name in MODELS}},
         ),
     }
     learnt = [name for name in CONFIG.learnt if CAMPAIGNS[name].selected_by is None]

@@ -1,7 +1,6 @@
 """Fits of measured tissues."""
 
 # Settings of the simulations made by fits.
-SIMULATOR = {**CONFIG.simulator, "pixels": CONFIG.pixels, "seed": CONFIG.seed}
 FITTED = list(TISSUES)
 JOINT = CONFIG.fit.joint if CONFIG.has_surrogate else ()
 

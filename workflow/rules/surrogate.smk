@@ -1,7 +1,10 @@
 """Surrogates: training, and errors on held-out simulations."""
 
-# The campaign of figures and baselines, and the repeats of each campaign.
+# The campaign of figures.
 MAIN = [CONFIG.main_campaign] if MODELS else []
+# Campaigns with test runs of their own that models learn from: baselines are for these.
+LEARNT = [name for name in CONFIG.tested if name in CONFIG.learnt]
+# The repeats of each campaign.
 REPEATS = {
     name: [other for other, block in CAMPAIGNS.items() if block.repeat_of == name]
     for name in CAMPAIGNS
@@ -168,10 +171,12 @@ rule evaluate_model:
     input:
         stack=rules.build_stack.output.stack,
         moulds=rules.design_campaign.output.moulds,
-        # A baseline predicts from the training split of the main campaign itself.
-        training=expand(rules.build_stack.output.stack, campaign=MAIN),
-        examples=expand(rules.list_examples.output.examples, campaign=MAIN),
         weights=lambda wildcards: WEIGHTS.get(wildcards.model, []),
+        # A baseline predicts from the campaign's own training split.
+        examples=lambda wildcards: expand(
+            rules.list_examples.output.examples,
+            campaign=wildcards.campaign if wildcards.model in BASELINES else [],
+        ),
     output:
         metrics=f"{RESULTS}/evaluation/{{model}}/campaigns/{{campaign}}.csv",
     log:
@@ -190,7 +195,7 @@ rule summarise_evaluation:
     input:
         metrics=lambda wildcards: expand(
             rules.evaluate_model.output.metrics,
-            campaign=MAIN if wildcards.model in BASELINES else CONFIG.tested,
+            campaign=CONFIG.tested if wildcards.model in WEIGHTS else LEARNT,
             allow_missing=True,
         ),
         floors=expand(
@@ -214,7 +219,7 @@ rule summarise_evaluation:
         mem_mb=800,
     params:
         campaigns=lambda wildcards: (
-            MODELS[wildcards.model].campaigns if wildcards.model in MODELS else MAIN
+            MODELS[wildcards.model].campaigns if wildcards.model in MODELS else LEARNT
         ),
     script:
         "../scripts/summarise_evaluation.py"
@@ -263,8 +268,9 @@ rule compare_models:
 
 
 rule predict_samples:
-    """Predict the held-out samples shown in figures: those with the median and the largest errors."""
+    """Predict, and simulate with further seeds, the samples in figures: those with the median and the largest errors."""
     input:
+        kernels=ancient(rules.compile_kernels.output.kernels),
         stack=expand(rules.build_stack.output.stack, campaign=MAIN),
         moulds=expand(rules.design_campaign.output.moulds, campaign=MAIN),
         metrics=ERRORS["metrics"],
@@ -278,6 +284,9 @@ rule predict_samples:
     threads: 1
     resources:
         mem_mb=2000,
+    params:
+        simulator=SIMULATOR,
+        seeds=3,
     script:
         "../scripts/predict_samples.py"
 

@@ -11,6 +11,7 @@ from raptor.studies.evaluation import evaluate, predictor_of
 from raptor.surrogate.baselines import baseline
 
 with logged(snakemake.log[0]):
+    stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))
     if snakemake.input.weights:
         import torch  # not needed by baselines
 
@@ -19,9 +20,8 @@ with logged(snakemake.log[0]):
         torch.set_num_threads(snakemake.threads)
         answer = predictor_of(load(Path(snakemake.input.weights[0]).parent))
     else:
-        (training,), (examples,) = snakemake.input.training, snakemake.input.examples
-        answer = baseline(snakemake.wildcards.model, Path(training), read_examples(Path(examples)))
-    stack, moulds = Path(snakemake.input.stack), moulds_by_id(Path(snakemake.input.moulds))
+        examples = read_examples(Path(snakemake.input.examples[0]))
+        answer = baseline(snakemake.wildcards.model, stack, examples)
     with progress("evaluation", len(read_table(stack).rows("test"))) as advance:
         metrics = evaluate(answer, stack, moulds, lambda s: advance(f"simulation {s}"))
     with atomic_path(Path(snakemake.output.metrics)) as path:

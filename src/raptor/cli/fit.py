@@ -113,7 +113,7 @@ def fit(
 
 
 def _told(
-    found: raptor.FittedTissue, photograph: raptor.MeasuredPhotograph | None
+    found: "raptor.FittedTissue", photograph: "raptor.MeasuredPhotograph | None"
 ) -> tuple[str, dict[str, Any]]:
     """A fit in words and in numbers, with how far its outline is from that in a photograph."""
     if photograph is None:
@@ -123,7 +123,7 @@ def _told(
     return f"{found}\n{said}", found.numbers | {"outlines_apart": apart}
 
 
-def _then(found: raptor.FittedTissue, mould: str) -> str:
+def _then(found: "raptor.FittedTissue", mould: str) -> str:
     """The next command: the whole tissue at the fit."""
     p = found.parameters
     point = f"--delta {p.delta:.4g} --kappa-nnn {p.kappa_nnn:.4g} --kappa-nnnn {p.kappa_nnnn:.4g}"
@@ -132,11 +132,11 @@ def _then(found: raptor.FittedTissue, mould: str) -> str:
 
 def _photographed(
     photo: Path | None,
-    mould: raptor.Mould,
+    mould: "raptor.Mould",
     overlay: Path | None,
     given: tuple[float | None, float | None],
     outline: Path | None,
-) -> raptor.MeasuredPhotograph | None:
+) -> "raptor.MeasuredPhotograph | None":
     """What is measured in a photograph, if one is given, and an overlay to check it by."""
     if photo is None:
         if overlay is not None:

@@ -60,7 +60,7 @@ Layers = Annotated[int, typer.Option(help="cell layers between floor and fill he
 
 def read_mould(
     mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None, layers: int | None = None
-) -> raptor.Mould:
+) -> "raptor.Mould":
     """Read a mould; print its scale and size in millimetres on standard error."""
     shape = raptor.read_mould(mould, scale, mm_per_l0, page)
     said = [shape.note, shape.in_millimetres(layers)]
@@ -75,7 +75,7 @@ def cell_parameters(
     kappa_nnnn: float | None,
     tissue: str | None = None,
     tissues: Path | None = None,
-) -> raptor.CellParameters:
+) -> "raptor.CellParameters":
     """Parameters from flags; missing ones from the fit of a tissue.
 
     Raises
@@ -139,8 +139,8 @@ def save_picture(what: Any, picture: Path | None, **options: Any) -> None:
 
 
 def measured(
-    photograph: Path, mould: raptor.Mould, overlay: Path | None, **options: Any
-) -> raptor.MeasuredPhotograph:
+    photograph: Path, mould: "raptor.Mould", overlay: Path | None, **options: Any
+) -> "raptor.MeasuredPhotograph":
     """Measure a photograph and write its overlay, which shows a refused one too."""
     try:
         with progress("measurement", None):

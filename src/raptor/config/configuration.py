@@ -236,7 +236,7 @@ class Configuration(Block):
 
     @property
     def main_campaign(self) -> str | None:
-        """The first campaign of the first model: figures and baselines are of its test runs; None without."""
+        """The first campaign of the first model: figures are of its test runs; None without."""
         return next((model.campaigns[0] for model in self.models.values()), None)
 
     @property
@@ -264,6 +264,12 @@ class Configuration(Block):
         """The model from random weights with which the training of a model began; it scales the fields."""
         model = self.models[name]
         return self.origin(model.initial_weights) if model.initial_weights else model
+
+    def means_until(self, name: str) -> int:
+        """Passes, counted from random weights, after which a model's networks sample."""
+        model = self.models[name]
+        before = self.means_until(model.initial_weights) if model.initial_weights else 0
+        return before + (0 if model.noise else model.epochs)
 
     def design(self, campaign: str) -> Design:
         """All that the design of a campaign depends on, apart from other campaigns and models."""

@@ -4,9 +4,11 @@ import logging
 import os
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import (
@@ -21,6 +23,9 @@ from rich.progress import (
 from raptor.core.errors import RaptorError
 
 log = logging.getLogger("raptor")
+
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
 
 
 @contextmanager
@@ -61,6 +66,15 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[str], None]]:
             bar.update(task, advance=1, note=note)
 
         yield advance
+
+
+def on_all_cores(answer: Callable[[Item], Answer], items: Iterable[Item]) -> Iterator[Answer]:
+    """Answers to items, in their order, computed on as many threads as the process has processors.
+
+    For numpy and torch, which compute without Python's lock, each on one thread.
+    """
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        yield from pool.map(answer, items)
 
 
 def hold_lock(path: Path, what: str) -> None:

@@ -16,6 +16,8 @@ from raptor.frame import pixel_size
 from raptor.moulds.cast import CastMould, central_section, once_per_cast, thin_parts
 from raptor.moulds.geometry import CLEARANCE, Mould
 
+Window = tuple[slice, slice]
+
 SAMPLES_PER_PIXEL = 4  # along a section
 ENCLOSING = 0.5  # of the threshold; even a single row of cells, below the threshold, encloses a tether
 GAP = 0.75  # l0, around a thin tether: mean distance of a wall from the first row of cells
@@ -69,16 +71,34 @@ def filled(
     threshold = cast.threshold if threshold is None else threshold
     above, free = density - threshold, outside(density, ENCLOSING * threshold)
     gap = np.where(outside(density, threshold), CLEARANCE, GAP)
-    for depth in cast.thin_tethers:
-        if not free[depth >= 0].any():
-            above = np.maximum(above, threshold * (depth + gap))
+    for window, depth in _thin_tethers(cast):
+        if not free[window][depth >= 0].any():
+            above[window] = np.maximum(above[window], threshold * (depth + gap[window]))
     return above
+
+
+@once_per_cast
+def _thin_tethers(cast: CastMould) -> list[tuple[Window, NDArray[np.float64]]]:
+    """Where each thin tether can fill tissue, and its depth there, l0."""
+    windows = [_around(depth > -1 - GAP) for depth in cast.thin_tethers]
+    return [(window, depth[window]) for window, depth in zip(windows, cast.thin_tethers, strict=True)]
 
 
 def outside(density: NDArray[np.floating], level: float) -> NDArray[np.bool_]:
     """Pixels (y, x) joined to the image's border by pixels at or below a level of density."""
-    marks, _ = label(~np.pad(density > level, 1))
-    return np.asarray(marks == marks[0, 0])[1:-1, 1:-1]
+    tissue = density > level
+    window, free = _around(tissue), ~tissue
+    marks, _ = label(np.pad(free[window], 1, constant_values=True))
+    free[window] = (marks == marks[0, 0])[1:-1, 1:-1]
+    return free
+
+
+def _around(there: NDArray[np.bool_]) -> Window:
+    """The part of an image that holds the pixels of a mask and their neighbours: the rest costs time."""
+    rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return slice(1), slice(1)
+    return slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
 
 
 def area_above(values: NDArray[np.floating]) -> float:
@@ -87,7 +107,7 @@ def area_above(values: NDArray[np.floating]) -> float:
     Each square between four pixel centres is split into four triangles, over which values are linear.
     Counting pixels would err by half a row along a straight wall.
     """
-    padded = np.pad(values.astype(np.float64), 1, mode="edge")
+    padded = np.pad(values[_around(values > 0)].astype(np.float64), 1, mode="edge")
     corners = np.stack([padded[:-1, :-1], padded[:-1, 1:], padded[1:, 1:], padded[1:, :-1]])
     positive = (corners > 0).sum(axis=0)
     share = (positive == 4).astype(np.float64)

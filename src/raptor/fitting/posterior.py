@@ -14,9 +14,10 @@ i the interpolation error. The prior is the paper's distribution: delta uniform,
 their bounded plane.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,10 +27,11 @@ from scipy.linalg import eigh
 from scipy.stats import chi2, norm, qmc
 
 from raptor.core.errors import RaptorError
+from raptor.core.jobs import on_all_cores
 from raptor.fitting.measurements import SEEN, seen
-from raptor.fitting.targets import PARAMETERS, Target, as_array, parameters_at, prior_density
+from raptor.fitting.targets import PARAMETERS, Target, parameters_at, prior_density, values_at
 from raptor.moulds.geometry import Mould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
+from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
 from raptor.surrogate.bands import LEVELS
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
@@ -142,20 +144,25 @@ def survey(
     units = qmc.Sobol(3, seed=seed).random(points)
     parameters = [parameters_at(unit) for unit in units]
     cast = surrogate.cast(mould)
-    level = LEVELS.index(0.95)
+
+    def examined(point: CellParameters) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+        found = surrogate.examine(cast, point)
+        half = found.measure_bands.half[LEVELS.index(0.95), :2]
+        return np.asarray(half[None], dtype=np.float64), [seen(found.values, cast, surrogate.threshold)]
+
+    def predicted(part: Sequence[CellParameters]) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+        fields = surrogate.predict(cast, part)
+        return np.empty((0, 2)), [seen(each, cast, surrogate.threshold) for each in fields]
+
+    parts = [parameters[start : start + TOGETHER] for start in range(BANDED, points, TOGETHER)]
     bands, values = [], []
-    for point in parameters[:BANDED]:
-        examined = surrogate.examine(cast, point)
-        bands.append(examined.measure_bands.half[level, :2])
-        values.append(seen(examined.values, cast, surrogate.threshold))
-        on_progress(f"{len(values)} of {points} predictions over the region")
-    for start in range(BANDED, points, TOGETHER):
-        fields = surrogate.predict(cast, parameters[start : start + TOGETHER])
-        values += [seen(each, cast, surrogate.threshold) for each in fields]
+    for half, measured in chain(on_all_cores(examined, parameters[:BANDED]), on_all_cores(predicted, parts)):
+        bands.append(half)
+        values += measured
         on_progress(f"{len(values)} of {points} predictions over the region")
     found = np.array(values)
     found[np.isnan(found) & ~np.isnan(found).all(axis=0)] = 0.0  # a tissue torn at a section has no width
-    return Survey(units, found, np.array(bands, dtype=float) / norm.ppf(0.975))
+    return Survey(units, found, np.concatenate(bands) / norm.ppf(0.975))
 
 
 def infer(
@@ -185,7 +192,7 @@ def infer(
     weights = prior * np.exp(log_likelihood - log_likelihood.max())
     return Posterior(
         units,
-        as_array([parameters_at(unit) for unit in units]),
+        values_at(units),
         values,
         found.names,
         prior / prior.sum(),

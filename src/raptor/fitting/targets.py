@@ -52,15 +52,22 @@ class Target:
 
 
 def parameters_at(unit: NDArray[np.float64]) -> CellParameters:
-    """Parameters at a point of the unit cube."""
-    delta, first, second = (float(v) for v in np.clip(unit, 0.0, 1.0))
-    kappa_nnn = _inside(KAPPA_NNN, first)
-    return CellParameters(_inside(DELTA, delta), kappa_nnn, _inside(_third(kappa_nnn), second))
+    """Parameters at a point (3,) of the unit cube."""
+    return CellParameters(*values_at(unit).tolist())
+
+
+def values_at(units: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same at points (..., 3), as numbers (..., 3) in the order of `PARAMETERS`."""
+    delta, first, second = np.moveaxis(np.clip(units, 0.0, 1.0), -1, 0)
+    kappa_nnn = _between(KAPPA_NNN.lower, KAPPA_NNN.upper, first)
+    third = _between(KAPPA_NNNN.lower, _highest(kappa_nnn), second)
+    return np.stack([_between(DELTA.lower, DELTA.upper, delta), kappa_nnn, third], axis=-1)
 
 
 def unit_of(parameters: CellParameters) -> NDArray[np.float64]:
     """Position (3,) of parameters in the unit cube, the inverse of `parameters_at`, clipped to the cube."""
-    bounds = (DELTA, KAPPA_NNN, _third(parameters.kappa_nnn))
+    third = Bounds(KAPPA_NNNN.lower, float(_highest(np.array(parameters.kappa_nnn))))
+    bounds = (DELTA, KAPPA_NNN, third)
     values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
     unit = [(v - b.lower) / (b.upper - b.lower) for v, b in zip(values, bounds, strict=True)]
     return np.clip(unit, 0.0, 1.0)
@@ -77,8 +84,7 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     delta is uniform, and so are both kappas over their bounded plane: the density is the length of the strip
     at a kappa_nnn.
     """
-    strips = [_third(_inside(KAPPA_NNN, float(first))) for first in units[:, 1]]
-    return np.array([strip.upper - strip.lower for strip in strips])
+    return _highest(values_at(units)[:, 1]) - KAPPA_NNNN.lower
 
 
 def surrogate_measure(surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
@@ -104,10 +110,10 @@ def surrogate_densities(
     return densities
 
 
-def _inside(bounds: Bounds, part: float) -> float:
-    return bounds.lower + part * (bounds.upper - bounds.lower)
+def _between(lower: float, upper: float | NDArray[np.float64], part: NDArray[np.float64]) -> Any:
+    return lower + part * (upper - lower)
 
 
-def _third(kappa_nnn: float) -> Bounds:
-    """Range of kappa_nnnn at a kappa_nnn."""
-    return Bounds(KAPPA_NNNN.lower, min(KAPPA_NNNN.upper, largest_kappa_nnnn(kappa_nnn)))
+def _highest(kappa_nnn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Upper end of the range of kappa_nnnn at each kappa_nnn, to which the bound is proportional."""
+    return np.minimum(KAPPA_NNNN.upper, kappa_nnn * largest_kappa_nnnn(1.0))

@@ -104,8 +104,11 @@ def _calibration(metrics: pd.DataFrame, summary: Mapping[str, Any], campaign: st
     return calibration_figure(metrics, summary[campaign]), coverage.reset_index()
 
 
-def _models(table: pd.DataFrame, histories: Sequence[pd.DataFrame], models: Sequence[str]) -> Drawn:
-    return models_figure(table, dict(zip(models, histories, strict=True))), table
+def _models(table: pd.DataFrame, histories: Sequence[pd.DataFrame], models: Mapping[str, int]) -> Drawn:
+    """`models` gives the number of epochs after which each samples; scores of samples are not comparable."""
+    found = zip(models.items(), histories, strict=True)
+    means = {name: history[history["epoch"] < until] for (name, until), history in found}
+    return models_figure(table, means), table
 
 
 def _active_learning(regions: pd.DataFrame, models: Sequence[str]) -> Drawn:
@@ -133,11 +136,22 @@ def _fields(samples: Path, moulds: Path) -> Drawn:
 
 def _worst(samples: Path, moulds: Path) -> Drawn:
     _, *worst = _samples(samples, moulds)
-    cases = [
-        (title, mould, stacks["simulation"][0], stacks["prediction"][0]) for title, mould, stacks in worst
-    ]
-    shown = {f"{mould.name}_{source}": stacks[source] for _, mould, stacks in worst for source in stacks}
-    return worst_figure(cases), _dataset(shown)
+    with open_file(samples) as file:
+        simulated, predicted = (
+            np.concatenate([file[first][1:, :1], file[others][1:]], axis=1).astype(np.float32)
+            for first, others in (("simulated", "again"), ("predicted", "drawn"))
+        )
+    found = zip(worst, simulated, predicted, strict=True)
+    cases = [(title, mould, seeds, draws) for (title, mould, _), seeds, draws in found]
+    shown = xr.Dataset(
+        {
+            "simulated": (("case", "seed", "y", "x"), simulated),
+            "predicted": (("case", "sample", "y", "x"), predicted),
+        },
+        coords={"case": [mould.name for _, mould, _ in worst]},
+        attrs={"title": "Density per pixel; the first prediction is the mean", "Conventions": "CF-1.11"},
+    )
+    return worst_figure(cases), shown
 
 
 def _samples(samples: Path, moulds: Path) -> list[tuple[str, Mould, Stacks]]:
@@ -234,7 +248,7 @@ FIGURES: dict[str, Callable[..., Drawn]] = {
     "descriptors": _descriptors,
     "outcomes": _outcomes,
     "bulk": _bulk,
-    "training": lambda history: (training_figure(history), history),
+    "training": lambda history, means_until: (training_figure(history, means_until), history),
     "calibration": _calibration,
     "regions": lambda metrics, regions: (regions_figure(metrics, regions), regions),
     "models": _models,

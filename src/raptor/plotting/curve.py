@@ -6,8 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from raptor.parameters import PARAMETERS
-from raptor.plotting.drawing import PREDICTED, SIMULATED, STYLED, THIRD, new_figure
-from raptor.plotting.fits import PARAMETER_LABELS
+from raptor.plotting.drawing import PARAMETER_LABELS, PREDICTED, SIMULATED, STYLED, THIRD, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd

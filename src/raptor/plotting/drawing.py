@@ -39,6 +39,11 @@ BULK_LABELS = {
     "Tbar": r"mean $\bar{T}$", "SxSx": "mean $S_x S_x$", "SxSxbar": r"mean $\overline{S_x S_x}$",
     "SySy": "mean $S_y S_y$", "SySybar": r"mean $\overline{S_y S_y}$",
 }  # fmt: skip
+PARAMETER_LABELS = {
+    "delta": r"$\Delta$",
+    "kappa_nnn": r"$\kappa_{NNN}/\kappa_0$",
+    "kappa_nnnn": r"$\kappa_{NNNN}/\kappa_0$",
+}
 STYLE: dict[Any, Any] = {
     "svg.hashsalt": "raptor", "svg.fonttype": "none", "font.size": 9, "axes.titlesize": 9,
     "axes.spines.top": False, "axes.spines.right": False, "figure.dpi": 120, "savefig.dpi": 150,

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -29,25 +30,43 @@ COLOURS = (
 
 
 @STYLED
-def training_figure(history: pd.DataFrame) -> Figure:
-    """Loss and validation error by epoch, one line per network; the kept weights are marked."""
-    figure = new_figure(9.0, 3.0)
-    losses, errors = figure.subplots(1, 2)
+def training_figure(history: pd.DataFrame, means_until: int) -> Figure:
+    """Loss and validation error by epoch, one line per network; the kept weights are marked.
+
+    Parameters
+    ----------
+    means_until : int
+        Epoch from which the networks sample. Both are scores of samples from there on, in own panels.
+    """
+    stages = [
+        ("distance to the target", "VRMSE", history[history["epoch"] < means_until]),
+        ("score of samples", "CRPS over std", history[history["epoch"] >= means_until]),
+    ]
+    stages = [stage for stage in stages if len(stage[-1])]
+    figure = new_figure(4.5 * (1 + len(stages)), 3.0)
+    for panels, (loss, error, table) in zip(
+        cast(Any, figure.subplots(1, 2 * len(stages))).reshape(-1, 2), stages, strict=True
+    ):
+        _draw_stage(panels, table)
+        panels[0].set(xlabel="epoch", ylabel=f"training loss: {loss}", yscale="log")
+        panels[1].set(xlabel="epoch", ylabel=f"validation error (mean {error})", ylim=(0, None))
+    return figure
+
+
+def _draw_stage(panels: Sequence[Axes], history: pd.DataFrame) -> None:
+    """Loss (dotted: a discriminator's) and validation error of each network in one stage of training."""
     kept = []
     for member, table in history.groupby("member"):
         colour = COLOURS[int(str(member)) % 7]
-        losses.plot(table["epoch"], table["reconstruction_loss"], color=colour, label=f"member {member}")
+        panels[0].plot(table["epoch"], table["reconstruction_loss"], color=colour, label=f"member {member}")
         if table["discriminator_loss"].any():
-            losses.plot(table["epoch"], table["discriminator_loss"], ":", color=colour)
-        errors.plot(table["epoch"], table["validation_error"], color=colour)
+            panels[0].plot(table["epoch"], table["discriminator_loss"], ":", color=colour)
+        panels[1].plot(table["epoch"], table["validation_error"], color=colour)
         best = table.iloc[int(table["validation_error"].argmin())]
-        errors.plot(best["epoch"], best["validation_error"], "o", color=colour)
+        panels[1].plot(best["epoch"], best["validation_error"], "o", color=colour)
         kept.append(float(best["validation_error"]))
-    losses.set(xlabel="epoch", ylabel="training loss (dotted: discriminator)", yscale="log")
-    losses.legend(frameon=False, fontsize=7)
-    errors.set_title("weights kept: " + ", ".join(f"{value:.3f}" for value in kept))
-    errors.set(xlabel="epoch", ylabel="validation error (mean VRMSE)", ylim=(0, None))
-    return figure
+    panels[0].legend(frameon=False, fontsize=7)
+    panels[1].set_title("least: " + ", ".join(f"{value:.3f}" for value in kept))
 
 
 @STYLED
@@ -146,24 +165,28 @@ def active_learning_figure(regions: pd.DataFrame) -> Figure:
 def worst_figure(
     cases: Sequence[tuple[str, Mould, NDArray[np.floating], NDArray[np.floating]]],
 ) -> Figure:
-    """Densities (y, x) of held-out cases, simulated above predicted, with titles."""
-    figure = new_figure(12.0, 8.6)
-    columns = 6
-    blocks = -(-len(cases) // columns)
-    grid = cast(Any, figure.subplots(2 * blocks, columns, squeeze=False))
-    for axes in grid.ravel():
-        axes.set_axis_off()
-    for number, (title, mould, simulated, predicted) in enumerate(cases):
-        row, column = 2 * (number // columns), number % columns
-        limit = float(np.percentile(simulated, 99.8)) or 1.0
-        for offset, density in enumerate((simulated, predicted)):
-            axes = grid[row + offset, column]
-            axes.set_axis_on()
-            show_field(axes, density, "density", limit)
-            draw_mould(axes, mould, fill=False)
-            if column == 0:
-                axes.set_ylabel(("simulation", "prediction")[offset])
-        grid[row, column].set_title(title, fontsize=7)
+    """Densities of held-out cases, with titles: simulations above, prediction and samples below.
+
+    Of each case (seeds, y, x), the held-out simulation first, then others with further seeds; and
+    (1 + samples, y, x), the mean first, then samples if there are any.
+    """
+    across = 3
+    figure = new_figure(14.0, 2.55 * -(-len(cases) // across))
+    blocks = cast(Any, figure.subfigures(-(-len(cases) // across), across, squeeze=False))
+    for block, (title, mould, simulated, predicted) in zip(blocks.ravel(), cases, strict=False):
+        grid = block.subplots(2, max(len(simulated), len(predicted)), squeeze=False)
+        limit = float(np.percentile(simulated[0], 99.8)) or 1.0
+        rows = {"simulated": simulated, "predicted": predicted}
+        for row, (name, images) in zip(grid, rows.items(), strict=True):
+            row[0].set_ylabel(name, fontsize=7)
+            for axes, density in zip(row, images, strict=False):
+                show_field(axes, density, "density", limit)
+                draw_mould(axes, mould, fill=False)
+            for axes in row[len(images) :]:
+                axes.set_axis_off()
+        for number, axes in enumerate(grid[1, : len(predicted)]):
+            axes.set_xlabel("sample" if number else "mean", fontsize=6)
+        block.suptitle(title, fontsize=7)
     return figure
 
 

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from raptor.moulds.geometry import Mould
 from raptor.plotting.drawing import (
     HALF,
+    PARAMETER_LABELS,
     PREDICTED,
     SEQUENTIAL,
     SIMULATED,
@@ -23,11 +24,6 @@ from raptor.plotting.drawing import (
     show_field,
 )
 
-PARAMETER_LABELS = {
-    "delta": r"$\Delta$",
-    "kappa_nnn": r"$\kappa_{NNN}/\kappa_0$",
-    "kappa_nnnn": r"$\kappa_{NNNN}/\kappa_0$",
-}
 COLOURS = (THIRD, PREDICTED, SIMULATED, "#3c8a5a", "#8a3355")
 LIMIT = -chi2.ppf(0.95, 1) / 2  # log profile likelihood at the ends of the 95 % interval
 

@@ -10,8 +10,7 @@ from raptor.fitting.fitted import FittedTissue
 from raptor.fitting.posterior import BOUNDS
 from raptor.imaging.report import MeasuredPhotograph
 from raptor.parameters import PARAMETERS
-from raptor.plotting.drawing import PREDICTED, SIMULATED, STYLED, THIRD, new_figure
-from raptor.plotting.fits import PARAMETER_LABELS
+from raptor.plotting.drawing import PARAMETER_LABELS, PREDICTED, SIMULATED, STYLED, THIRD, new_figure
 from raptor.plotting.overlay import BELOW, draw_measured
 from raptor.plotting.tissue import draw_tissue, height_of, write_rows
 

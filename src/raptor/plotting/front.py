@@ -12,8 +12,7 @@ from raptor.fields.labelled import mould_of
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import read_mould
 from raptor.moulds.summary import summarise
-from raptor.plotting.drawing import fields_figure, mould_figure
-from raptor.plotting.fits import PARAMETER_LABELS
+from raptor.plotting.drawing import PARAMETER_LABELS, fields_figure, mould_figure
 from raptor.plotting.tissue import tissue_figure
 from raptor.symmetry import FIELDS
 

@@ -10,14 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from raptor.dataset.netcdf import create, variable
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.parameters import PARAMETERS
 from raptor.studies.scores import scores, summary_of
 from raptor.surrogate.bands import LEVELS, MEASURED
 from raptor.surrogate.prediction import Prediction
@@ -245,45 +243,6 @@ def regions_of(tables: Mapping[str, pd.DataFrame], trained: Collection[str]) -> 
         part = by_region(table) if number == 0 or name in trained else by_region(table).head(1)
         parts.append(part.assign(region=f"{name}: " + part["region"]) if number else part)
     return pd.concat(parts, ignore_index=True)
-
-
-def median_and_worst(metrics: pd.DataFrame) -> list[int]:
-    """Simulations to be drawn: that with the median error of density, then the worst."""
-    ordered = metrics.sort_values("vrmse_density")["simulation"].tolist()
-    return [ordered[len(ordered) // 2], *worst(metrics)["simulation"].tolist()]
-
-
-def predict_samples(
-    path: Path, surrogate: "Surrogate", stack: Path, moulds: Mapping[str, Mould], chosen: pd.DataFrame
-) -> None:
-    """Write fields of samples of a stack, simulated and predicted, as netCDF.
-
-    Parameters
-    ----------
-    chosen : DataFrame
-        Rows of `evaluate` by simulation, in the order in which samples are written.
-    """
-    table, along = read_table(stack), ("sample", "field", "y", "x")
-    row_of = {simulation: row for row, simulation in enumerate(table.simulation.tolist())}
-    samples = list(read_samples(stack, [row_of[simulation] for simulation in chosen.index]))
-    predicted = [surrogate.predict(moulds[s.mould], [s.parameters])[0] for s in samples]
-    with create(path, "Held-out samples, simulated and predicted", "prediction") as file:
-        sizes = (len(samples), len(FIELDS), table.pixels, table.pixels)
-        for name, size in zip(along, sizes, strict=True):
-            file.createDimension(name, size)
-        variable(file, "field", ("field",), np.array(FIELDS), "name of the field")
-        variable(file, "simulation", ("sample",), chosen.index.to_numpy(), "simulation id")
-        variable(file, "mould", ("sample",), chosen["mould"].to_numpy(), "mould id")
-        for name, text in (PARAMETERS | {"vrmse_density": "VRMSE of density"}).items():
-            variable(file, name, ("sample",), chosen[name].to_numpy(), text)
-        simulated = np.array([sample.fields for sample in samples])
-        variable(file, "simulated", along, simulated, "simulated fields, per pixel")
-        variable(file, "predicted", along, np.array(predicted), "predicted fields, per pixel")
-
-
-def worst(metrics: pd.DataFrame, count: int = 12) -> pd.DataFrame:
-    """The samples with the largest error of density, worst first."""
-    return metrics.sort_values("vrmse_density", ascending=False).head(count)
 
 
 def agreement(metrics: pd.DataFrame, name: str) -> dict[str, float]:

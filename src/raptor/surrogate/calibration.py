@@ -52,7 +52,7 @@ class Case:
 
     def error(self, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Errors (4,) of the estimates, likewise, and deviations over realisations (4,)."""
-        estimate, deviations = self.found.estimate(threshold)
+        estimate, deviations, _ = self.found.measure(threshold)
         return np.nan_to_num(estimate) - self.simulated, deviations
 
 

@@ -1,12 +1,11 @@
 """Prediction as a user asks for it."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from typing import overload
 
+from raptor.core.jobs import on_all_cores
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, require_parameters
@@ -80,8 +79,7 @@ def predict(
     cast = surrogate.cast(as_mould(mould))
     if not isinstance(cells, Sequence):
         return surrogate.examine(cast, points[0])
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:  # torch computes on one thread each
-        return list(pool.map(partial(surrogate.examine, cast), points))
+    return list(on_all_cores(partial(surrogate.examine, cast), points))
 
 
 @cache

@@ -47,29 +47,26 @@ class Realisations:
         """The mean's `bands.MEASURED` (4,); `threshold` is the density above which there is tissue."""
         return np.array([*shape_ratios(self.mean_density, self.cast, threshold), *self.directions[0]])
 
-    def estimate(self, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Estimates of `bands.MEASURED` (4,) and their standard deviations over realisations (4,)."""
-        ratios = [shape_ratios(density, self.cast, threshold) for density in self._full(slice(1, None))]
-        each = np.column_stack([ratios, self.directions[1:]])
-        return _mean(each) if self.sampled else self.of_mean(threshold), deviation(each)
+    def measure(
+        self, threshold: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Estimates of `bands.MEASURED` (4,), their deviations (4,) and chances of tethers (tethers,).
 
-    def held(self, threshold: float) -> NDArray[np.float64]:
-        """Chance that tissue encloses each tether (tethers,): the share of realisations in which it does.
-
-        NaN if the tissue as cast does not enclose it: see `tethers.seen_held`.
+        The chance that tissue encloses a tether is the share of realisations in which it does; NaN if the
+        tissue as cast does not enclose it: see `tethers.seen_held`.
         """
-        each = [seen_held(density, self.cast, threshold) for density in self._full(slice(1, None))]
-        return np.asarray(np.mean(each, axis=0))
+        densities = full_density(self.densities[1:], self.cast)
+        ratios = [shape_ratios(density, self.cast, threshold) for density in densities]
+        each = np.column_stack([ratios, self.directions[1:]])
+        estimates = _mean(each) if self.sampled else self.of_mean(threshold)
+        held = np.mean([seen_held(density, self.cast, threshold) for density in densities], axis=0)
+        return estimates, deviation(each), held
 
     @cached_property
     def mean_density(self) -> NDArray[np.float32]:
         """The mean's density (y, x) at full resolution."""
-        (density,) = self._full(slice(1))
+        (density,) = full_density(self.densities[:1], self.cast)
         return np.asarray(density)
-
-    def _full(self, which: slice) -> NDArray[np.float32]:
-        """Densities (n, y, x) at full resolution."""
-        return full_density(self.densities[which], self.cast)
 
 
 @dataclass(frozen=True)

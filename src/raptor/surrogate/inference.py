@@ -136,14 +136,14 @@ class Surrogate:
             )
         cast, calibration = self.cast(mould), self.calibration
         found = self.ensemble(cast, parameters)
-        measures, deviations = found.realisations.estimate(self.own_threshold)
+        measures, deviations, held = found.realisations.measure(self.own_threshold)
         point = descriptors(cast.depression, cast.tethers, parameters)
         return Prediction(
             cast,
             parameters,
             found.mean,
             measures,
-            found.realisations.held(self.own_threshold),
+            held,
             calibration.fields.bands(found.deviation, np.abs(found.mean[:1])),
             calibration.measures.bands(deviations, np.ones(len(measures))),
             found.answers,

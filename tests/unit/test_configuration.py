@@ -47,11 +47,28 @@ def test_configurations_fit_schema_and_model(root, name):
     assert Configuration.model_validate(configuration.model_dump(mode="json")) == configuration
 
 
+@pytest.mark.parametrize(
+    ("name", "added"),
+    [
+        ("full", "comparison"),
+        ("full", "learning_curve"),
+        ("paper", "active_learning"),
+        ("paper", "published"),
+    ],
+)
+def test_configurations_to_be_added_fit_those_that_they_name(root, name, added):
+    first, second = (yaml.safe_load((root / "config" / f"{n}.yaml").read_text()) for n in (name, added))
+    for block in ("campaigns", "models"):  # as Snakemake merges two files
+        first[block] |= second.pop(block, {})
+    configuration = Configuration.model_validate(first | second)
+    assert set(configuration.models) > {"film_unet"}
+
+
 def test_the_paper_is_configured_as_it_states(root):
     paper = load(root / "config" / "paper.yaml")
     campaign = paper.campaigns["paper"]
     assert (campaign.runs, campaign.test, campaign.edge) == (3569, 445, 500)
-    assert (paper.layers, paper.pixels, paper.surrogate) == (7, 256, "active")
+    assert (paper.layers, paper.pixels, paper.surrogate) == (7, 256, "film_unet")
 
 
 @pytest.mark.parametrize("name", ["laptop", "paper"])

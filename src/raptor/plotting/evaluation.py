@@ -21,6 +21,7 @@ from raptor.plotting.drawing import (
     new_figure,
     show_field,
 )
+from raptor.studies.scores import CHANCES
 from raptor.symmetry import FIELDS
 
 SHAPE_LABELS = {"area_ratio": "$A/A_0$", "width_ratio": "$w/w_0$"}
@@ -71,42 +72,64 @@ def _draw_stage(panels: Sequence[Axes], history: pd.DataFrame) -> None:
 
 @STYLED
 def calibration_figure(metrics: pd.DataFrame, summary: Mapping[str, Any]) -> Figure:
-    """Coverage of the bands against their nominal levels; error against band of both ratios."""
-    figure = new_figure(11.0, 3.6)
-    panels = figure.subplots(1, 3)
+    """Coverage of bands, error against band of both ratios, spread against error, chances of tethers."""
+    figure = new_figure(11.0, 7.2)
+    panels = figure.subplots(2, 3).ravel()
+    _draw_coverage(panels[0], summary["coverage"])
+    for axes, (name, label) in zip(panels[1:], SHAPE_LABELS.items(), strict=False):
+        error = (metrics[f"{name}_predicted"] - metrics[f"{name}_simulated"]).abs()
+        _draw_errors(axes, metrics[f"{name}_band95"], error, metrics["out_of_distribution"].astype(bool))
+        axes.set(xlabel=f"half width of the 95 % band of {label}", ylabel=f"error of {label}")
+    spread, skill = np.sqrt(metrics["spread"]), np.sqrt(metrics["skill"])
+    _draw_errors(panels[3], spread, skill, metrics["out_of_distribution"].astype(bool))
+    panels[3].set(
+        xscale="log", yscale="log", xlabel="spread of samples of density", ylabel="error of their mean"
+    )
+    _draw_chances(panels[4], metrics)
+    panels[5].set_axis_off()
+    return figure
+
+
+def _draw_coverage(axes: Axes, coverage: Mapping[str, float]) -> None:
+    """Share that each band holds, of each field and ratio, beside what it promises."""
     names = [*FIELDS, *SHAPE_LABELS]
     labels = {name: text[text.index("$") :] for name, text in LABELS.items()} | SHAPE_LABELS
-    levels = sorted({column.split("_")[0] for column in summary["coverage"]})
+    levels = sorted({column.split("_")[0] for column in coverage})
     for level, colour in zip(levels, COLOURS, strict=False):
-        found = [summary["coverage"][f"{level}_{name}"] for name in names]
+        found = [coverage[f"{level}_{name}"] for name in names]
         promised = int(level.removeprefix("cover")) / 100
-        panels[0].axhline(promised, color=colour, lw=0.8, ls="--")
-        panels[0].plot(range(len(names)), found, "o", color=colour, label=f"{100 * promised:.0f} % band")
-    panels[0].set_xticks(range(len(names)), [labels[name] for name in names], rotation=60)
-    panels[0].set(ylabel="share covered", ylim=(0, 1.02))
-    panels[0].legend(frameon=False, fontsize=7, loc="lower left")
-    for axes, (name, label) in zip(panels[1:], SHAPE_LABELS.items(), strict=True):
-        error = (metrics[f"{name}_predicted"] - metrics[f"{name}_simulated"]).abs()
-        flagged = metrics["out_of_distribution"].astype(bool)
-        for part, colour, text in (
-            (~flagged, SIMULATED, "like the training set"),
-            (flagged, PREDICTED, "flagged"),
-        ):
-            axes.plot(
-                metrics[f"{name}_band95"][part],
-                error[part],
-                "o",
-                ms=3,
-                mec="none",
-                alpha=0.6,
-                color=colour,
-                label=text,
-            )
-        top = float(np.nanmax([error.max(), metrics[f"{name}_band95"].max()]))
-        axes.plot([0, top], [0, top], "--", color=THIRD, lw=0.8)
-        axes.set(xlabel=f"half width of the 95 % band of {label}", ylabel=f"error of {label}")
-        axes.legend(frameon=False, fontsize=7)
-    return figure
+        axes.axhline(promised, color=colour, lw=0.8, ls="--")
+        axes.plot(range(len(names)), found, "o", color=colour, label=f"{100 * promised:.0f} % band")
+    axes.set_xticks(range(len(names)), [labels[name] for name in names], rotation=60)
+    axes.set(ylabel="share covered", ylim=(0, 1.02))
+    axes.legend(frameon=False, fontsize=7, loc="lower left")
+
+
+def _draw_errors(axes: Axes, expected: pd.Series, error: pd.Series, flagged: pd.Series) -> None:
+    """Errors against what is expected of them, one point per simulation; dashed: both equal."""
+    for part, colour, text in (
+        (~flagged, SIMULATED, "like the training set"),
+        (flagged, PREDICTED, "flagged"),
+    ):
+        style: dict[str, Any] = {"ms": 3, "mec": "none", "alpha": 0.6, "color": colour}
+        axes.plot(expected[part], error[part], "o", **style, label=text)
+    ends = [float(np.nanmin([error.min(), expected.min()])), float(np.nanmax([error.max(), expected.max()]))]
+    axes.plot(ends, ends, "--", color=THIRD, lw=0.8)
+    axes.legend(frameon=False, fontsize=7)
+
+
+def _draw_chances(axes: Axes, metrics: pd.DataFrame) -> None:
+    """How often tethers are held against the predicted chance, with their number, by class of the chance."""
+    total = metrics[[name for name in metrics if "_at_" in str(name)]].sum()
+    axes.plot([0, 1], [0, 1], "--", color=THIRD, lw=0.8)
+    for lowest in CHANCES:
+        ending = f"at_{100 * lowest:.0f}"
+        number = total[f"seen_{ending}"]
+        if number:
+            place = total[f"chance_{ending}"] / number, total[f"seen_held_{ending}"] / number
+            axes.plot(*place, "o", color=SIMULATED)
+            axes.annotate(f"{number:.0f}", place, xytext=(5, -9), textcoords="offset points", fontsize=7)
+    axes.set(xlabel="predicted chance that a tether is held", ylabel="share that is held")
 
 
 @STYLED

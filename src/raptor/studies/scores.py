@@ -9,6 +9,9 @@ from raptor.fields.resample import block_average
 from raptor.fields.tethers import seen_held
 from raptor.surrogate.prediction import Prediction
 
+CHANCES = (0.0, 0.1, 0.5, 0.9)
+"""Lower ends of the classes of predicted chances that a tether is held."""
+
 
 def scores(guess: Prediction, sample: Sample) -> dict[str, float]:
     """Scores of the answers behind a prediction as samples of density, and of the chance that posts are held.
@@ -16,7 +19,8 @@ def scores(guess: Prediction, sample: Sample) -> dict[str, float]:
     `crps_density`: the fair continuous ranked probability score, mean over pixels, on the networks' raster;
     `spread` and `skill`: variance of the answers, corrected for their number, and squared error of their
     mean; `brier`: sum over tethers of the squared error of the chance, `seen_held` and `seen`: how many
-    of them the simulated tissue encloses, and of how many.
+    of them the simulated tissue encloses, and of how many; `seen_at_10` and so on: the same for those with a
+    predicted chance in each class of `CHANCES`, and `chance_at_10`, the sum of these chances.
     """
     import torch  # here, because tables and figures do not wait for it
     from torch_crps import crps_ensemble
@@ -27,13 +31,22 @@ def scores(guess: Prediction, sample: Sample) -> dict[str, float]:
     crps = crps_ensemble(last, torch.from_numpy(wanted), biased=False)
     truth = seen_held(sample.fields[0], guess.cast)
     known = np.isfinite(truth) & np.isfinite(guess.held)
+    truth, chance = truth[known], guess.held[known]
+    classes = np.digitize(chance, CHANCES) - 1
+    found = {}
+    for number, lowest in enumerate(CHANCES):
+        there = classes == number
+        found[f"seen_at_{100 * lowest:.0f}"] = float(there.sum())
+        found[f"seen_held_at_{100 * lowest:.0f}"] = float(truth[there].sum())
+        found[f"chance_at_{100 * lowest:.0f}"] = float(chance[there].sum())
     return {
         "crps_density": float(crps.mean()),
         "spread": float(answers.var(axis=0, ddof=1).mean() * (1 + 1 / len(answers))),
         "skill": float(((answers.mean(axis=0) - wanted) ** 2).mean()),
-        "brier": float(((guess.held - truth)[known] ** 2).sum()),
-        "seen_held": float(truth[known].sum()),
+        "brier": float(((chance - truth) ** 2).sum()),
+        "seen_held": float(truth.sum()),
         "seen": float(known.sum()),
+        **found,
     }
 
 

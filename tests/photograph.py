@@ -57,13 +57,16 @@ class Camera:
 
 
 def coverage(shape, camera):
-    """Share of each pixel (row, column) that lies in a shape, l0; holes are filled."""
+    """Share of each pixel (row, column) that lies in a shape, l0."""
     rows, columns = camera.size
     figure = Figure(figsize=(columns / 100, rows / 100), dpi=100, facecolor="black")
-    for part in shapely.get_parts(shape):
-        column, row = camera.registration.to_pixels(shapely.get_coordinates(part.exterior)).T
+    parts = shapely.get_parts(shape)
+    rings = [(part.exterior, "white") for part in parts]
+    rings += [(hole, "black") for part in parts for hole in part.interiors]
+    for ring, colour in rings:
+        column, row = camera.registration.to_pixels(shapely.get_coordinates(ring)).T
         corners = np.column_stack([column + 0.5, rows - row - 0.5])  # a pixel's corner, from below
-        figure.add_artist(Polygon(corners, facecolor="white", edgecolor="none", transform=None, snap=False))
+        figure.add_artist(Polygon(corners, facecolor=colour, edgecolor="none", transform=None, snap=False))
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., 0] / 255

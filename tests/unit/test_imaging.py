@@ -225,6 +225,31 @@ def test_a_wall_seen_as_a_band_is_refused_and_measured_by_landmarks(width):
     assert (found.area_ratio, found.width_ratio) == pytest.approx(outline_ratios(TISSUE, MOULD), abs=0.01)
 
 
+DISC = Mould(
+    shapely.Point(0, 0).buffer(20, quad_segs=32),
+    (shapely.box(-12, -9, 12, -7), shapely.box(-12, 7, 12, 9), Circle(16.5, 0.0, 1.0)),
+    name="disc",
+)
+
+
+@pytest.mark.parametrize("angle", [100, -80, 171])
+@pytest.mark.parametrize("mould", [read_mould("hydrogel_construct"), DISC], ids=lambda mould: mould.name)
+def test_where_the_outline_fits_in_several_directions_tethers_tell_which(mould, angle):
+    camera = Camera(angle=angle, floor=0.55, tissue=0.2)
+    tissue = contracted(mould, 0.3, 0.12)
+    found = measured(photograph(mould, tissue, camera), mould)
+    area, width = outline_ratios(tissue, mould)
+    assert found.area_ratio == pytest.approx(area, abs=0.01)
+    assert found.width_ratio == pytest.approx(width, abs=0.01)
+
+
+def test_a_direction_that_no_tether_tells_is_refused():
+    camera = Camera(angle=30, floor=0.55, tissue=0.2, post=0.55)
+    pixels = photograph(DISC, shapely.Point(0, 0).buffer(5), camera)  # it covers none of the tethers
+    with pytest.raises(RaptorError, match=r"fits in several directions.*give --landmark"):
+        measured(pixels, DISC)
+
+
 def test_the_mirror_image_of_a_mould_without_mirrors_needs_to_be_said():
     corners = [(-24, -12), (20, -12), (24, 2), (6, 13), (-10, 8), (-24, 12)]
     mould = Mould(shapely.Polygon(corners), (Circle(-18, -6, 1.5), Circle(15, -6, 1.5)), name="skew")

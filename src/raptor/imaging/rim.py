@@ -5,6 +5,7 @@ across the outline and tethers, and the similarity is fitted to them, as in acti
 Taylor, Cooper and Graham 1995, Comput. Vis. Image Underst. 61, 38).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,11 @@ BAND = 0.9  # l0 to either side of the rim where a second edge is refused
 BAND_PART = 0.35  # share of the rim along which a second edge counts
 SECOND_EDGE = 0.2  # its slope, relative to the rim's
 MIN_SCALE = 8.0  # pixels per l0; needed to separate a tissue near the rim from it
+ALIKE = 0.02  # overlaps this near tell nothing about direction
+DIRECTIONS = 0.16  # radians between directions that are tried, of which at most
+TRIED = 8
+UNCLEAR = 0.1  # share of the tethers' edges; differences this small do not tell directions apart
+SAME = 0.8  # share of the tethers that directions alike by symmetry have in common
 ADVICE = "show the whole mould with plate around it, try --mirrored, or give --landmark or --aligned"
 
 
@@ -55,9 +61,9 @@ class Edges:
     normals: NDArray[np.float64]
     rim: NDArray[np.bool_]
 
-    def of_rim(self) -> "Edges":
-        """Those of the rim alone."""
-        return Edges(self.points[self.rim], self.normals[self.rim], self.rim[self.rim])
+    def only(self, there: NDArray[np.bool_]) -> "Edges":
+        """Some of them, (n,)."""
+        return Edges(self.points[there], self.normals[there], self.rim[there])
 
 
 def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) -> Registration:
@@ -74,15 +80,25 @@ def find_rim(values: NDArray[np.float64], mould: Mould, mirrored: bool = False) 
     slopes = np.hypot(*np.gradient(even))
     region = _region(plate, slopes)
     polygon = _as_polygon(region)
-    found = _start(polygon, mould, mirrored)
     edges = mould_edges(mould)
-    # First the boundary of the region alone: a tissue near the rim has stronger edges.
-    rim = edges.of_rim()
-    for reach in WIDE:
-        found = _fit(found, rim, _edge_offsets(region.astype(float), rim, found, reach, 0.1))
+    rim, tethers = edges.only(edges.rim), edges.only(~edges.rim)
     least = EDGE * float(np.median(slopes[plate]))
-    for reach in CLOSE:
-        found = _fit(found, edges, _edge_offsets(even, edges, found, reach, least))
+
+    def fitted(pose: Registration) -> Registration:
+        # First the boundary of the region alone: a tissue near the rim has stronger edges.
+        for reach in WIDE:
+            pose = _fit(pose, rim, _edge_offsets(region.astype(float), rim, pose, reach, 0.1))
+        for reach in CLOSE:
+            pose = _fit(pose, edges, _edge_offsets(even, edges, pose, reach, least))
+        return pose
+
+    def seen(pose: Registration, reach: float) -> float:
+        """Share of the tethers' edges that are seen where a pose has them."""
+        offsets = _edge_offsets(even, tethers, pose, 1.5 * reach, least)
+        return float(np.mean(np.abs(offsets) < reach)) if len(offsets) else 0.0
+
+    starts = _apart(_starts(polygon, mould, mirrored), lambda pose: seen(pose, WIDE[-1]))
+    found = _told_by_tethers([fitted(start) for start in starts], lambda pose: seen(pose, NEAR), mould)
     if found.scale < MIN_SCALE:
         raise RegistrationError(
             f"the mould is too small in the image: {found.scale:.1f} pixels per l0, at least {MIN_SCALE:g} "
@@ -150,25 +166,60 @@ def _as_polygon(region: NDArray[np.bool_]) -> shapely.Polygon:
     return shapely.Polygon(contour[:, ::-1]).buffer(0).simplify(0.5)
 
 
-def _start(region: shapely.Polygon, mould: Mould, mirrored: bool) -> Registration:
-    """The mould's outline with the region's area and centre, in the direction of most overlap."""
+def _starts(region: shapely.Polygon, mould: Mould, mirrored: bool) -> list[Registration]:
+    """The mould's outline with the region's area and centre, in the directions of most overlap.
+
+    Of those that overlap alike, as a symmetric outline's do, the least turn comes first.
+    """
     scale = np.sqrt(region.area / mould.outline.area)
     flip = np.diag([1.0, 1.0 if mirrored else -1.0])
     centre, middle = (shapely.get_coordinates(shape.centroid)[0] for shape in (region, mould.outline))
-    best, found = -1.0, None
-    angles = np.arange(-ANGLES // 2, ANGLES // 2) * 2 * np.pi / ANGLES
-    for angle in sorted(angles, key=abs):
+    poses = []
+    for angle in sorted(np.arange(-ANGLES // 2, ANGLES // 2) * 2 * np.pi / ANGLES, key=abs):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         matrix = np.eye(3)
         matrix[:2, :2] = scale * turn @ flip
         matrix[:2, 2] = centre - matrix[:2, :2] @ middle
-        candidate = Registration(matrix, "rim", float("nan"))
-        overlap = _overlap(candidate, mould, region)
-        if overlap > best + 1e-3:  # of a symmetric mould, the least turn
-            best, found = overlap, candidate
-    assert found is not None
-    _require_overlap(found, MIN_OVERLAP[0], mould, region)
-    return found
+        poses.append(Registration(matrix, "rim", float("nan")))
+    overlaps = np.array([_overlap(pose, mould, region) for pose in poses])
+    _require_overlap(poses[overlaps.argmax()], MIN_OVERLAP[0], mould, region)
+    order = np.argsort(-np.round(overlaps, 3), kind="stable")
+    return [poses[number] for number in order if overlaps[number] > overlaps.max() - ALIKE]
+
+
+def _apart(poses: list[Registration], seen: Callable[[Registration], float]) -> list[Registration]:
+    """A few poses in different directions, in which most of the tethers is seen; their order is kept."""
+    shares = np.round([seen(pose) for pose in poses], 1)
+    chosen: list[int] = []
+    for number in np.argsort(-shares, kind="stable").tolist():
+        turns = [abs(_turn(poses[number], poses[other])) for other in chosen]
+        if min(turns, default=np.inf) > DIRECTIONS:
+            chosen.append(number)
+    return [poses[number] for number in sorted(chosen[:TRIED])]
+
+
+def _told_by_tethers(
+    poses: list[Registration], seen: Callable[[Registration], float], mould: Mould
+) -> Registration:
+    """The pose in which the tethers are seen; of those alike by the mould's own symmetry, the first."""
+    shares = np.array([seen(pose) for pose in poses])
+    close = [pose for pose, share in zip(poses, shares, strict=True) if share > shares.max() - UNCLEAR]
+    posts = shapely.union_all([tether.polygon for tether in mould.tethers])
+    for other in close[1:]:
+        moved = shapely.transform(shapely.transform(posts, other.to_pixels), close[0].to_mould)
+        if moved.intersection(posts).area < SAME * posts.area:
+            raise RegistrationError(
+                f"the outline of {mould.name} fits in several directions, and its tethers are not seen "
+                "clearly enough to tell which; give --landmark at two tethers",
+                close[0],
+            )
+    return close[0]
+
+
+def _turn(first: Registration, second: Registration) -> float:
+    """Angle between two poses, radians, -pi to pi."""
+    between = np.linalg.solve(first.matrix[:2, :2], second.matrix[:2, :2])
+    return float(np.arctan2(between[1, 0], between[0, 0]))
 
 
 def _overlap(registration: Registration, mould: Mould, region: shapely.Polygon) -> float:

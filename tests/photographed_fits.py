@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+import shapely
 from skimage import io
 
 import raptor
@@ -28,8 +29,15 @@ def made(number):
     unit = rng.random(3) * (0.7, 1, 1)  # above 0.68 tissues leave their posts
     tissue = raptor.simulate(mould, parameters_at(unit), seed=SEED + number)
     fields = tissue.fields()
-    outline = tissue_above(fields["density"].to_numpy() - fields.attrs["threshold"], mould.name)
-    outline = outline.intersection(mould.depression)
+    threshold = fields.attrs["threshold"]
+    outline, cast = (
+        tissue_above(density - threshold, mould.name)
+        for density in (fields["density"].to_numpy(), tissue.cast_mould.density)
+    )
+    # A gel fills its mould, a lattice only to within up to half a spacing; the gel beyond it contracts too.
+    whole = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(cast)])
+    gap = (mould.outline.area - whole.area) / mould.outline.length
+    outline = outline.buffer(gap * np.sqrt(tissue.area_ratio)).intersection(mould.depression)
     look = LOOKS[number % len(LOOKS)]
     camera = Camera(SQUARE, 10, rng.uniform(-180, 180), noise=rng.uniform(0.03, 0.05), unevenness=0.6, **look)
     return mould, tissue, photograph(mould, outline, camera, number)

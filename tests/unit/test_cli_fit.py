@@ -25,7 +25,8 @@ def test_fit_by_a_surrogate_gives_intervals(tmp_path, quick_fits):
     assert done.returncode == 0, done.stderr
     numbers, content = json.loads(done.stdout), json.loads(output.read_text())
     assert numbers["simulations"] == 0
-    assert numbers["delta_lower"] <= numbers["delta_upper"]
+    for name in ("delta", "kappa_nnn", "kappa_nnnn"):
+        assert numbers[f"{name}_lower"] <= numbers[name] <= numbers[f"{name}_upper"]
     assert numbers["rss"] == pytest.approx(content["fit"]["rss"])
     assert content["target"] == {"area_ratio": 0.81404, "width_ratio": 0.7972}
     assert picture.read_bytes().startswith(b"\x89PNG")

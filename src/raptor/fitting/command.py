@@ -1,7 +1,7 @@
 """Fits as a user asks for them: to ratios or an outline, by the surrogate or the simulator."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import get_args
 
@@ -52,7 +52,8 @@ def fit(
 ) -> FittedTissue:
     """Fit delta, kappa_nnn and kappa_nnnn to a measured tissue, with what the fit leaves open.
 
-    Intervals are those of the posterior (docs/fits.md), or for an outline follow from the derivatives.
+    Intervals are those of the posterior (docs/fits.md), widened to hold the fit where it lies at a bound, or
+    for an outline follow from the derivatives.
 
     Parameters
     ----------
@@ -166,8 +167,9 @@ def _fit(request: Request) -> FittedTissue:
     intervals = _intervals(request, target, found) if isinstance(target, Outline) else {}
     known = {} if posterior is None else summarise(posterior)
     if posterior is not None:
-        quantiles = {name: known["parameters"][name]["quantiles"] for name in PARAMETERS}
-        intervals = {name: (each["0.025"], each["0.975"]) for name, each in quantiles.items()}
+        for name, value in asdict(found.parameters).items():  # at a bound it lies beyond all quantiles
+            quantiles = known["parameters"][name]["quantiles"]
+            intervals[name] = min(quantiles["0.025"], value), max(quantiles["0.975"], value)
     return FittedTissue(
         request.mould,
         target,

@@ -30,17 +30,19 @@ def fitted_figure(fit: FittedTissue, photograph: MeasuredPhotograph | None = Non
         What the ratios were measured in.
     """
     fields = fit.tissue.to_dataset()
-    pictures = 1 if photograph is None else 2
-    height = max(2.4, 4.2 * height_of(fit.mould)) if photograph is None else 3.9
     rows = dict(fit.table) | ({"warning": fit.warning} if fit.warning else {})
     below = max(1.5, 0.19 * len(rows))
-    figure = new_figure(max(9.6, 5.2 * pictures), height + below + 0.4)
+    height = max(2.4, below, 4.2 * height_of(fit.mould)) if photograph is None else 3.9
+    figure = new_figure(10.4, height + below + 0.4)
     top, bottom = cast(Any, figure.subfigures(2, 1, height_ratios=[height, below + 0.4]))
-    panels = top.subplots(1, pictures, squeeze=False)[0]
-    draw_tissue(top, panels[-1], fields, fit.mould)
-    if photograph is not None:
-        _draw_photograph(panels[0], photograph, fields)
-    words, *axes = bottom.subplots(1, 4, width_ratios=[2.6, 1, 1, 1])
+    left, right = top.subplots(1, 2)
+    if photograph is None:
+        draw_tissue(top, left, fields, fit.mould)
+        words, axes = right, bottom.subplots(1, 3)
+    else:
+        _draw_photograph(left, photograph, fields)
+        draw_tissue(top, right, fields, fit.mould)
+        words, *axes = bottom.subplots(1, 4, width_ratios=[2.6, 1, 1, 1])
     write_rows(words, rows)
     for each, name in zip(axes, PARAMETERS, strict=True):
         _draw_parameter(each, fit, name)

@@ -45,7 +45,7 @@ class Configuration(Block):
         (1, 2, 3), description="neighbour shells of kappa0, kappa_nnn and kappa_nnnn"
     )
     tension: Literal["hooke", "literal"] = Field(
-        "hooke", description="hooke: k (|l| - L'); literal: k L', the paper's formula"
+        "hooke", description="hooke: k (length - L'); literal: k L', the paper's formula"
     )
     accuracy: Literal["draft", "standard", "reference"] = Field(
         "standard", description="accuracy of every simulation: draft, standard or reference"

@@ -210,7 +210,8 @@ def test_scores_tell_samples_of_the_truth_from_others():
             "crps_density": 0.0, "spread": answers.var(axis=0, ddof=1).mean() * (1 + 1 / 16),
             "skill": ((answers.mean(axis=0) - truth) ** 2).mean(), "brier": (chance - held) ** 2,
             "seen_held": held, "seen": 1.0, "vrmse_density": chance,
-            "distance": chance**2, "disagreement": 0.0,
+            # A distance within the limit says nothing.
+            "distance": 0.9 * (1 - chance), "disagreement": chance**2,
         })  # fmt: skip
     found = summary_of(pd.DataFrame(rows))
     assert found["spread_over_skill"] == pytest.approx(1, abs=0.05)

@@ -55,11 +55,13 @@ def summary_of(metrics: pd.DataFrame) -> dict[str, float]:
 
     `crps_density`; `spread_over_skill`, 1 if answers scatter as simulations do; `brier`, the Brier score of
     the chance that a tether is held, and `brier_of_base_rate`, that of the share of tethers that are;
-    `flag_auc`, how well distance and disagreement tell the quarter with the largest errors from the rest.
+    `flag_auc`, how well the flag's measure tells the quarter with the largest errors from the rest: it is the
+    disagreement, or the distance where that is out of distribution.
     """
     total = metrics[["spread", "skill", "brier", "seen_held", "seen"]].sum()
     rate = total["seen_held"] / total["seen"] if total["seen"] else np.nan
-    doubt = metrics[["distance", "disagreement"]].max(axis=1)
+    disagreement, distance = metrics["disagreement"], metrics["distance"]
+    doubt = distance.where(distance > 1, disagreement).clip(lower=disagreement)
     large = metrics["vrmse_density"] >= metrics["vrmse_density"].quantile(0.75)
     return {
         "crps_density": float(metrics["crps_density"].mean()),

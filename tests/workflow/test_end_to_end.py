@@ -112,6 +112,12 @@ def test_surrogate_evaluation_fit_and_tradeoff_are_there(results):
         "alignment", "anisotropy",
     }  # fmt: skip
     assert all(0 <= share <= 1 for share in metrics["paper"]["coverage"].values())
+    with xr.open_dataset(results / "evaluation" / "samples.nc") as samples:
+        simulated, again = samples["simulated"][:, 0], samples["again"]
+        assert again.sizes["seed"] == 3
+        cells = simulated.sum(("y", "x"))
+        assert np.allclose(again.sum(("y", "x")), cells, rtol=1e-3)
+        assert (abs(again - simulated).max(("y", "x")) > 0).all()  # other seeds, other tissues
     floor = pd.read_csv(results / "evaluation" / "floors" / "paper.csv")
     assert floor["runs"].tolist() == [3]
     assert (floor["vrmse_density"] > 0).all()

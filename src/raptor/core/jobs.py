@@ -68,12 +68,14 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[str], None]]:
         yield advance
 
 
-def on_all_cores(answer: Callable[[Item], Answer], items: Iterable[Item]) -> Iterator[Answer]:
-    """Answers to items, in their order, computed on as many threads as the process has processors.
+def in_threads(
+    answer: Callable[[Item], Answer], items: Iterable[Item], threads: int | None = None
+) -> Iterator[Answer]:
+    """Answers to items, in their order, by so many threads; None: one for each processor of the process.
 
     For numpy and torch, which compute without Python's lock, each on one thread.
     """
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
         yield from pool.map(answer, items)
 
 

@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 from scipy.stats import chi2, norm, qmc
 
 from raptor.core.errors import RaptorError
-from raptor.core.jobs import on_all_cores
+from raptor.core.jobs import in_threads
 from raptor.fitting.measurements import SEEN, seen
 from raptor.fitting.targets import PARAMETERS, Target, parameters_at, prior_density, values_at
 from raptor.moulds.geometry import Mould
@@ -130,11 +130,12 @@ def survey(
     seed: int,
     points: int = POINTS,
     on_progress: Callable[[str], None] = lambda note: None,
+    threads: int | None = None,
 ) -> Survey:
     """Evaluate the surrogate for a mould at points (a power of two) that fill the region.
 
     Predictions are means over the images of D4, like those on which bands were calibrated; bands are computed
-    at the first 32 points.
+    at the first 32 points. `threads` compute them, each torch's on one; None: one for each processor.
 
     Raises
     ------
@@ -156,7 +157,8 @@ def survey(
 
     parts = [parameters[start : start + TOGETHER] for start in range(BANDED, points, TOGETHER)]
     bands, values = [], []
-    for half, measured in chain(on_all_cores(examined, parameters[:BANDED]), on_all_cores(predicted, parts)):
+    singly = in_threads(examined, parameters[:BANDED], threads)
+    for half, measured in chain(singly, in_threads(predicted, parts, threads)):
         bands.append(half)
         values += measured
         on_progress(f"{len(values)} of {points} predictions over the region")

@@ -5,7 +5,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import overload
 
-from raptor.core.jobs import on_all_cores
+from raptor.core.jobs import in_threads
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
 from raptor.parameters import CellParameters, require_parameters
@@ -79,7 +79,7 @@ def predict(
     cast = surrogate.cast(as_mould(mould))
     if not isinstance(cells, Sequence):
         return surrogate.examine(cast, points[0])
-    return list(on_all_cores(partial(surrogate.examine, cast), points))
+    return list(in_threads(partial(surrogate.examine, cast), points))
 
 
 @cache

@@ -108,6 +108,26 @@ class Browser:
             self.mouse("mouseMoved", *place)
         self.mouse("mouseReleased", *end)
 
+    def touch(self, start, end, steps=8):
+        """A finger put down, moved and lifted."""
+        self.ask(
+            "Input.dispatchTouchEvent", type="touchStart", touchPoints=[dict(zip("xy", start, strict=True))]
+        )
+        for step in range(1, steps + 1):
+            share = step / steps
+            x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+            self.ask("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{"x": x, "y": y}])
+        self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def key(self, name, **about):
+        """A key pressed and released; `modifiers` 2 is Ctrl, 8 Shift."""
+        for kind in ("keyDown", "keyUp"):
+            self.ask("Input.dispatchKeyEvent", type=kind, key=name, **about)
+
+    def click(self, name):
+        """A click on the element with an id."""
+        self.value(f"document.getElementById('{name}').click()")
+
     def picture(self, path):
         """Save a screenshot."""
         path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"]))

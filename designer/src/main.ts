@@ -135,8 +135,10 @@ function removeSelected(): void {
 function addTether(isBar: boolean): void {
   const [x, y] = edit.freePlace(design.mould);
   const tether = isBar ? { polygon: edit.rectangleRing({ x, y, length: 6, width: 1.5, angle: Math.PI / 2 }) } : { x, y, radius: 1.2 };
-  selection = { kind: "tether", index: design.mould.tethers.length };
+  const index = design.mould.tethers.length;
+  selection = { kind: "tether", index };
   changeMould(edit.addTether(design.mould, tether, design.symmetry), true);
+  stage.focus("tether", index);
 }
 
 // ---- the stage

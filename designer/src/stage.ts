@@ -110,6 +110,12 @@ export class Stage {
     for (const [key, node] of this.nodes) if (!kept.has(key)) { node.remove(); this.nodes.delete(key); }
   }
 
+  /** Gives the keyboard to a handle, once it is drawn. */
+  focus(part: Part, index: number): void {
+    this.draw();
+    this.svg.querySelector<SVGElement>(`[data-kind="${part}"][data-index="${index}"]`)?.focus({ preventScroll: true });
+  }
+
   private put(kept: Set<string>, part: Part, index: number, tag: string, attributes: Record<string, number | string>, selected: boolean, radius = 0, name = ""): void {
     const key = `${part} ${index} ${tag} ${name}`;
     kept.add(key);

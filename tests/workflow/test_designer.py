@@ -49,6 +49,13 @@ def start(browser, mould):
     return shown(browser)
 
 
+def choose(browser, name, value):
+    """Choose in a list of the page, as a user does."""
+    there = f"document.getElementById('{name}')"
+    browser.value(f"{there}.value = '{value}'")
+    browser.value(f"{there}.dispatchEvent(new Event('change', {{bubbles: true}}))")
+
+
 def assert_same(numbers, prediction):
     """Whether the page says what `raptor predict` says."""
     assert numbers["cells"] == prediction.cast.n_cells
@@ -118,6 +125,49 @@ def test_symmetry_undo_and_what_cannot_be_cast(browser):
     assert "cross" in browser.value("raptor.trouble")
     assert browser.value("raptor.numbers") is None
     assert browser.said == []
+
+
+def test_ten_actions_by_mouse_and_keyboard_change_what_they_say(browser):
+    start(browser, "four_post_rectangle")
+    tethers = "raptor.design.mould.tethers"
+    browser.click("post")  # 1
+    assert browser.value(f"{tethers}.length") == 5
+    browser.click("bar")  # 2
+    assert browser.value(f"{tethers}.length") == 6
+    before = browser.value(tethers)
+    browser.key("ArrowRight")  # 3: the new bar is selected
+    assert browser.value(tethers) != before
+    browser.key("Delete")  # 4
+    assert browser.value(f"{tethers}.length") == 5
+    browser.key("z", code="KeyZ", modifiers=2)  # 5
+    assert browser.value(f"{tethers}.length") == 6
+    browser.key("z", code="KeyZ", modifiers=2 + 8)  # 6
+    assert browser.value(f"{tethers}.length") == 5
+    browser.click("keep")  # 7
+    kept = shown(browser)
+    choose(browser, "tissue", "corneal")  # 8
+    after = shown(browser)
+    assert after["ratios"][0] < kept["ratios"][0] - 0.1  # corneal cells contract more
+    choose(browser, "field", "tension")  # 9
+    corner = browser.value("raptor.design.mould.outline[0]")
+    browser.drag(
+        *(browser.value(f"raptor.toScreen({corner[0] * s}, {corner[1] * s})") for s in (1, 0.95))
+    )  # 10
+    assert shown(browser)["ratios"] != after["ratios"]
+    assert browser.said == []
+
+
+def test_a_finger_moves_a_post_on_a_small_screen(browser):
+    browser.resize(390, 844, mobile=True)
+    start(browser, "four_post_rectangle")
+    post = browser.value("raptor.design.mould.tethers[0]")
+    places = [browser.value(f"raptor.toScreen({post['x'] * s}, {post['y'] * s})") for s in (1, 0.7)]
+    browser.touch(*places)
+    moved = browser.value("raptor.design.mould.tethers[0]")
+    assert (moved["x"], moved["y"]) == pytest.approx((0.7 * post["x"], 0.7 * post["y"]), abs=0.5)
+    assert browser.value("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.said == []
+    browser.resize(1280, 800)
 
 
 def test_a_rebuild_gives_the_same_page(tmp_path):

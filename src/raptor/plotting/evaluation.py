@@ -31,17 +31,19 @@ COLOURS = (
 
 
 @STYLED
-def training_figure(history: pd.DataFrame, means_until: int) -> Figure:
+def training_figure(history: pd.DataFrame, means_until: int | None = None) -> Figure:
     """Loss and validation error by epoch, one line per network; the kept weights are marked.
 
     Parameters
     ----------
-    means_until : int
-        Epoch from which the networks sample. Both are scores of samples from there on, in own panels.
+    means_until : int or None
+        Epoch from which the networks sample, None if they do not. Both are then scores of samples, in panels
+        of their own.
     """
+    means = history["epoch"] < (np.inf if means_until is None else means_until)
     stages = [
-        ("distance to the target", "VRMSE", history[history["epoch"] < means_until]),
-        ("score of samples", "CRPS over std", history[history["epoch"] >= means_until]),
+        ("distance to the target", "VRMSE", history[means]),
+        ("score of samples", "CRPS over std", history[~means]),
     ]
     stages = [stage for stage in stages if len(stage[-1])]
     figure = new_figure(4.5 * (1 + len(stages)), 3.0)

@@ -23,8 +23,8 @@ workflow/env snakemake --cores all --dry-run  # what would run, and why
 ```
 
 The Snakefile lists the parts. A file in `workflow/rules` wires files. A script in `workflow/scripts`, named
-like its rule, makes one call into the package. A rule without files is a target: `snakemake TARGET --cores
-all`. Files are under `results/{name}`.
+like its rule, makes one call into the package. A rule without files is a target:
+`workflow/env snakemake TARGET --cores all`. Files are under `results/{name}`.
 
 `workflow/env python workflow/reference.py` writes this page, and its picture where Graphviz is installed.
 """

@@ -19,9 +19,10 @@ DEFAULTS_HEAD = """\
 """
 README_HEAD = """# Configuration
 
-`laptop.yaml` is the default. Another file, such as `paper.yaml`, states only what differs; choose it with
-`--configfile config/paper.yaml`. Unknown keys are errors. Paths are found beside the configuration, then in
-the folder of the run. Every simulation belongs to an entry of `campaigns`; a new study is one more entry:
+Without `--configfile`, `laptop.yaml` is used. A file that you name, as by `--configfile config/paper.yaml`,
+takes its place; keys that it leaves out have the defaults below, which are those in `laptop.yaml` but for
+`trained_model`. Unknown keys are errors. Paths are found beside the configuration, then in the folder of the
+run. Every simulation belongs to an entry of `campaigns`; a new study is one more entry:
 
 ```yaml
 campaigns:

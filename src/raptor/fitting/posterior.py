@@ -17,7 +17,6 @@ their bounded plane.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,25 +145,26 @@ def survey(
     parameters = [parameters_at(unit) for unit in units]
     cast = surrogate.cast(mould)
 
-    def examined(point: CellParameters) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    def examined(point: CellParameters) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         found = surrogate.examine(cast, point)
         half = found.measure_bands.half[LEVELS.index(0.95), :2]
-        return np.asarray(half[None], dtype=np.float64), [seen(found.values, cast, surrogate.threshold)]
+        return np.asarray(half, dtype=np.float64), seen(found.values, cast, surrogate.threshold)
 
-    def predicted(part: Sequence[CellParameters]) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-        fields = surrogate.predict(cast, part)
-        return np.empty((0, 2)), [seen(each, cast, surrogate.threshold) for each in fields]
+    def predicted(part: Sequence[CellParameters]) -> list[NDArray[np.float64]]:
+        return [seen(each, cast, surrogate.threshold) for each in surrogate.predict(cast, part)]
 
-    parts = [parameters[start : start + TOGETHER] for start in range(BANDED, points, TOGETHER)]
     bands, values = [], []
-    singly = in_threads(examined, parameters[:BANDED], threads)
-    for half, measured in chain(singly, in_threads(predicted, parts, threads)):
+    for half, measured in in_threads(examined, parameters[:BANDED], threads):
         bands.append(half)
-        values += measured
+        values.append(measured)
+        on_progress(f"{len(values)} of {points} predictions over the region")
+    parts = [parameters[start : start + TOGETHER] for start in range(BANDED, points, TOGETHER)]
+    for several in in_threads(predicted, parts, threads):
+        values += several
         on_progress(f"{len(values)} of {points} predictions over the region")
     found = np.array(values)
     found[np.isnan(found) & ~np.isnan(found).all(axis=0)] = 0.0  # a tissue torn at a section has no width
-    return Survey(units, found, np.concatenate(bands) / norm.ppf(0.975))
+    return Survey(units, found, np.array(bands) / norm.ppf(0.975))
 
 
 def infer(

@@ -36,7 +36,7 @@ from raptor.config import Configuration, load
 from raptor.core.device import chosen_device
 from raptor.core.files import atomic_path
 from raptor.dataset.design import Run
-from raptor.dataset.scaling import Scaling
+from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.fields.metrics import vrmse
 from raptor.moulds.geometry import Mould
 from raptor.parameters import NetworkModel
@@ -184,7 +184,8 @@ def prediction_seconds(architecture: Architecture, device: torch.device, batch: 
     kind = torch.bfloat16 if device.type == "cuda" else torch.float32
     plain = Scaling((0.0,) * len(FIELDS), (1.0,) * len(FIELDS))
     generator = Generator(architecture, plain).to(device, kind).eval()
-    inputs = torch.randn(batch, 5, architecture.pixels, architecture.pixels, device=device, dtype=kind)
+    size = architecture.pixels, architecture.pixels
+    inputs = torch.randn(batch, len(INPUTS), *size, device=device, dtype=kind)
     with torch.no_grad():
         return seconds_of(lambda: generator(inputs, torch.ones(batch, device=device)), device) / batch
 

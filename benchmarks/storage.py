@@ -23,6 +23,7 @@ from benchmarks.training import examples_a_second, published
 from raptor.core.device import chosen_device
 from raptor.dataset.examples import read_examples, training_scaling
 from raptor.dataset.stack import read_samples, read_table
+from raptor.moulds import moulds_by_id
 from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.rules import TrainingRules
 
@@ -116,7 +117,7 @@ def main(
     CONSOLE.print(table)
 
     examples = list(islice(read_examples(folder / "examples.csv"), 4 * samples))
-    dataset = ExampleSet(stack, examples, training_scaling(stack))
+    dataset = ExampleSet(stack, examples, moulds_by_id(folder / "moulds.geojson"), training_scaling(stack))
     table = Table(title=f"One epoch of {len(examples)} examples, batches of {batch_size}")
     for head in ("what", "samples/s"):
         table.add_column(head, justify="right")

@@ -27,6 +27,7 @@ export interface Model {
   physical: boolean; // whether the networks obey the constraints by construction
   clearance: number;
   threshold: number; // of predictions, calibrated
+  own_threshold: number; // of each sample, or of each network's mean
   cast_threshold: number; // of the tissue as cast
   fields: string[];
   scaling: { offset: number[]; scale: number[] };

@@ -6,6 +6,7 @@ import { alignmentAndAnisotropy } from "./measures";
 import { project, projectDensity, reachable, withSign } from "./physics";
 import { held, ratios } from "./shape";
 import { apply, elements, movePixels, type Element } from "./symmetry";
+import { pixelSize } from "./model";
 import type { Cells, ErrorScale, Model, Mould } from "./model";
 
 /** What runs the networks. */
@@ -44,7 +45,7 @@ export type Pause = () => Promise<void>;
 
 export class Predictor {
   private readonly elements: Element[];
-  private last: { key: string; cast: Cast; there: Uint8Array; masks: Float32Array[] } | null = null;
+  private last: { key: string; cast: Cast; there: Uint8Array; images: Float32Array[] } | null = null;
 
   constructor(private readonly model: Model, private readonly networks: Networks) {
     this.elements = elements(model.network_pixels);
@@ -55,8 +56,9 @@ export class Predictor {
     if (this.last?.key !== key) {
       const cast = castMould(job.mould, this.model);
       const { pixels, network_pixels } = this.model;
-      const masks = [cast.depression, cast.tethers].map((mask) => blockAverage(mask, pixels, network_pixels));
-      this.last = { key, cast, there: reachable(cast.depression, this.model), masks };
+      const bulk = this.model.layers * pixelSize(this.model) ** 2, relative = cast.density.map((each) => each / bulk);
+      const images = [cast.depression, cast.tethers, relative].map((each) => blockAverage(each, pixels, network_pixels));
+      this.last = { key, cast, there: reachable(cast.depression, this.model), images };
     }
     const { cast } = this.last;
     const about = unusual(descriptors(cast, job.cells, this.model), this.model);
@@ -88,7 +90,7 @@ export class Predictor {
     const numbers = this.numbers(fields, cast);
     [numbers.alignment, numbers.anisotropy] = alignmentAndAnisotropy(middle, cast, small);
     if (!job.whole) return { fields, deviation: null, samples: [], numbers };
-    const threshold = sampled ? model.cast_threshold : model.threshold;
+    const threshold = model.own_threshold;
     const each: number[][] = [], enclosed: number[][] = [];
     for (const own of sampled ? answers.flat() : answers.map(mean)) {
       const density = await this.density(own, cast);
@@ -112,7 +114,7 @@ export class Predictor {
     const found: Prediction["samples"] = [];
     for (const answer of raw) {
       const fields = await this.finish(answer, cast, false);
-      found.push({ fields, numbers: this.numbers(fields, cast, this.model.cast_threshold) });
+      found.push({ fields, numbers: this.numbers(fields, cast, this.model.own_threshold) });
     }
     return found;
   }
@@ -120,7 +122,7 @@ export class Predictor {
   /** Fields of one image by one member, moved back, in physical units, on the networks' raster. */
   private async answer(job: Job, cast: Cast, member: number, element: Element, noise: Float32Array | null) {
     const { model } = this, pixels = model.network_pixels, size = pixels ** 2, inputs = new Float32Array(5 * size);
-    this.last!.masks.forEach((mask, channel) => {
+    this.last!.images.forEach((mask, channel) => {
       const moved = movePixels(mask, element);
       for (let p = 0; p < size; p++) inputs[channel * size + p] = 2 * moved[p] - 1;
     });

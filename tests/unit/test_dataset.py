@@ -229,12 +229,12 @@ def test_scaling_survives_json():
     assert Scaling.from_json(scaling.as_json()) == scaling
 
 
-def test_inputs_are_masks_and_constants_in_minus_one_to_one():
+def test_inputs_are_images_and_constants_in_minus_one_to_one():
     masks = np.eye(4, dtype=np.uint8)
-    inputs = scale_inputs(masks, 1 - masks, CellParameters(0.95, 0.1, 0.01))
-    assert inputs.shape == (5, 4, 4)
-    assert set(np.unique(inputs[:2])) == {-1, 1}
-    assert [float(c[0, 0]) for c in inputs[2:]] == pytest.approx([1, -1, -1])
+    inputs = scale_inputs(np.stack([masks, 1 - masks, masks]), CellParameters(0.95, 0.1, 0.01))
+    assert inputs.shape == (6, 4, 4)
+    assert set(np.unique(inputs[:3])) == {-1, 1}
+    assert [float(c[0, 0]) for c in inputs[3:]] == pytest.approx([1, -1, -1])
 
 
 def test_a_failed_simulation_is_recorded_and_the_rest_survives(made, tmp_path, monkeypatch):

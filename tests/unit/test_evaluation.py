@@ -277,13 +277,14 @@ def test_active_learning_chooses_where_networks_disagree(surrogate):
     assert sorted(scores) == pytest.approx(every[-2:])
 
 
-def test_examples_of_two_stacks_are_counted_through(stack):
+def test_examples_of_two_stacks_are_counted_through(stack, moulds):
     one, scaling = list_examples(stack), training_scaling(stack)
     table = read_table(stack)
     both, splits = join_examples([stack, stack], [one, one])
     assert splits == 2 * table.split
     assert len(both) == 2 * len(one)
-    joined, alone = ExampleSet([stack, stack], both, scaling), ExampleSet(stack, [*one, *one], scaling)
+    joined = ExampleSet([stack, stack], both, moulds, scaling)
+    alone = ExampleSet(stack, [*one, *one], moulds, scaling)
     for number in range(len(both)):
         assert all(torch.equal(a, b) for a, b in zip(joined[number], alone[number], strict=True))
 

@@ -77,7 +77,7 @@ def test_the_stack_states_seeds_and_model():
 def examples():
     chosen = read_examples(CAMPAIGN / "examples.csv")[:12]
     stack = CAMPAIGN / "fields.nc"
-    return ExampleSet(stack, chosen, training_scaling(stack))
+    return ExampleSet(stack, chosen, moulds_by_id(CAMPAIGN / "moulds.geojson"), training_scaling(stack))
 
 
 def test_an_example_is_its_sample_moved_and_scaled(examples):
@@ -93,7 +93,7 @@ def test_the_tutorial_runs(monkeypatch):
     monkeypatch.chdir(ROOT)
     printed = executed("\n".join(python_blocks(ROOT / "docs" / "tutorial.md")))
     count = len(read_examples(CAMPAIGN / "examples.csv"))
-    assert f"{count} examples; inputs (5, 64, 64), targets (8, 64, 64)" in printed
+    assert f"{count} examples; inputs (6, 64, 64), targets (8, 64, 64)" in printed
 
 
 def test_the_storage_benchmark_prints_its_tables():

@@ -41,6 +41,10 @@ rule train_member:
         stacks=lambda wildcards: expand(
             rules.build_stack.output.stack, campaign=MODELS[wildcards.model].campaigns
         ),
+        moulds=lambda wildcards: expand(
+            rules.design_campaign.output.moulds,
+            campaign=MODELS[wildcards.model].campaigns,
+        ),
         examples=lambda wildcards: expand(
             rules.list_examples.output.examples,
             campaign=MODELS[wildcards.model].campaigns,
@@ -84,10 +88,7 @@ rule assemble_model:
     """Assemble the networks of a model, and calibrate its bands on its campaigns' validation splits."""
     input:
         stacks=rules.train_member.input.stacks,
-        moulds=lambda wildcards: expand(
-            rules.design_campaign.output.moulds,
-            campaign=MODELS[wildcards.model].campaigns,
-        ),
+        moulds=rules.train_member.input.moulds,
         weights=lambda wildcards: expand(
             rules.train_member.output.weights,
             member=range(MODELS[wildcards.model].ensemble_size),

@@ -11,6 +11,7 @@ from raptor.core.jobs import logged, progress
 from raptor.dataset.examples import join_examples, read_examples, training_rows
 from raptor.dataset.scaling import read_scaling
 from raptor.dataset.stack import read_table
+from raptor.moulds import moulds_by_id
 from raptor.surrogate.batches import split_examples
 from raptor.surrogate.files import load, save
 from raptor.surrogate.inference import Surrogate
@@ -32,10 +33,11 @@ with logged(snakemake.log[0]):
     identity = content_hash([params.identity, params.seed, *data])
     runs = {name: len(training_rows(stack, fraction)) for name, stack in zip(campaigns, stacks, strict=True)}
     listed = [read_examples(path) for path in files]
+    moulds = dict(item for path in snakemake.input.moulds for item in moulds_by_id(Path(path)).items())
     examples, splits = join_examples(stacks, listed, fraction, every_image=rules.noise > 0)
     with progress("training", rules.epochs) as advance:
         trained = train(
-            *split_examples(stacks, examples, splits, scaling, architecture.pixels),
+            *split_examples(stacks, examples, splits, moulds, scaling, architecture.pixels),
             architecture,
             rules,
             seed=params.seed,

@@ -20,7 +20,7 @@ from raptor.symmetry import FIELDS
 SHARED = (("sxsx", "sysy"), ("sxsz", "sysz"))
 SIGNED = ("tension", "sxsy", "sxsz", "sysz")
 SCALED = {"delta": DELTA, "kappa_nnn": KAPPA_NNN, "kappa_nnnn": KAPPA_NNNN}
-INPUTS = ("depression", "tethers", *SCALED)
+INPUTS = ("depression", "tethers", "as_cast", *SCALED)
 
 
 @dataclass(frozen=True)
@@ -68,16 +68,20 @@ def fit_scaling(low: NDArray[np.floating], high: NDArray[np.floating]) -> Scalin
     return Scaling(tuple(float(v) for v in (high + low) / 2), tuple(float(v) for v in scale))
 
 
-def scale_inputs(
-    depression: NDArray[Any], tethers: NDArray[Any], parameters: CellParameters
-) -> NDArray[np.float32]:
-    """The five input channels (5, y, x) in [-1, 1]: two masks, then the parameters as constants."""
-    channels = np.empty((len(INPUTS), *depression.shape), dtype=np.float32)
-    channels[0] = 2.0 * depression - 1.0
-    channels[1] = 2.0 * tethers - 1.0
-    for row, (name, bounds) in enumerate(SCALED.items(), start=2):
-        channels[row] = (getattr(parameters, name) - bounds.middle) / bounds.half
+def scale_inputs(images: NDArray[np.floating], parameters: CellParameters) -> NDArray[np.float32]:
+    """The six input channels (6, y, x), about -1 to 1: three images, then the parameters as constants.
+
+    `images` (3, y, x) are those of `resample.coarse_images`: depression, tethers and density as cast.
+    """
+    channels = np.empty((len(INPUTS), *images.shape[1:]), dtype=np.float32)
+    channels[: len(images)] = 2.0 * images - 1.0
+    channels[len(images) :] = scaled_parameters(parameters)[:, None, None]
     return channels
+
+
+def scaled_parameters(parameters: CellParameters) -> NDArray[np.float64]:
+    """Delta, kappa_nnn and kappa_nnnn (3,), -1 to 1 over their ranges."""
+    return np.array([(getattr(parameters, name) - each.middle) / each.half for name, each in SCALED.items()])
 
 
 def write_scaling(path: Path, scaling: Scaling, campaigns: Sequence[str], fraction: float = 1.0) -> None:

@@ -22,12 +22,16 @@ def block_average(images: Array, pixels: int) -> Array:
     return squares.mean((-3, -1))  # type: ignore[no-any-return]
 
 
-def coarse_masks(cast: CastMould, pixels: int) -> NDArray[np.float32]:
-    """Depression and tethers of a mould (2, pixels, pixels) as block averages, as networks are given them."""
-    masks: NDArray[np.float32] = block_average(
-        np.stack([cast.depression, cast.tethers]).astype(np.float32), pixels
+def coarse_images(cast: CastMould, pixels: int) -> NDArray[np.float32]:
+    """What networks see of a mould (3, pixels, pixels): block averages of depression, tethers and density.
+
+    The density is that as cast, over the density far from walls. It tells how the lattice meets the walls,
+    on which half of the variance between runs hangs (docs/surrogate.md).
+    """
+    images: NDArray[np.float32] = block_average(
+        np.stack([cast.depression, cast.tethers, cast.relative_density]).astype(np.float32), pixels
     )
-    return masks
+    return images
 
 
 def deconvolve(images: Array, pixels: int) -> Array:

@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
-from raptor.frame import IMAGE_SIZE
+from raptor.frame import IMAGE_SIZE, pixel_size
 from raptor.moulds.geometry import CLEARANCE, FITTED, Mould
 from raptor.moulds.loops import centre_of, smallest_loop
 from raptor.moulds.raster import MouldImage, mould_image, tether_depth
@@ -76,18 +76,34 @@ class CastMould:
 
     @cached_property
     def sites(self) -> NDArray[np.float64]:
-        """Sites (cells, 3), l0; raises as `cast_sites`."""
-        return cast_sites(self.mould, self.layers, self.clearance)
+        """Sites (cells, 3), l0, by layer, then y, then x; raises as `planes`."""
+        return _stacked(self.planes, self.layers)
+
+    @cached_property
+    def planes(self) -> list[NDArray[np.float64]]:
+        """Sites (n, 2) of the even and of the odd layers, l0; raises as `cast_sites`."""
+        return _planes(self.mould, self.layers, self.clearance)
 
     @property
     def n_cells(self) -> int:
         """Number of cells."""
-        return len(self.sites)
+        return sum(len(plane) * count for plane, count in self._counted)
+
+    @property
+    def _counted(self) -> list[tuple[NDArray[np.float64], int]]:
+        """Each plane and the number of layers like it."""
+        return [(plane, len(range(parity, self.layers, 2))) for parity, plane in enumerate(self.planes)]
 
     @cached_property
     def density(self) -> NDArray[np.float64]:
         """Density per pixel (y, x) of the tissue as cast, before it contracts."""
-        return density_image(self.sites, self.pixels)
+        images = [count * density_image(plane, self.pixels) for plane, count in self._counted]
+        return np.asarray(sum(images))
+
+    @property
+    def relative_density(self) -> NDArray[np.float64]:
+        """The same over that far from walls, (y, x)."""
+        return self.density / (self.layers * pixel_size(self.pixels) ** 2)
 
     @property
     def threshold(self) -> float:
@@ -117,10 +133,9 @@ class CastMould:
         Indices of sites, one lattice step apart (`smallest_loop`).
         """
         starts = np.searchsorted(self.sites[:, 2], (np.arange(self.layers) + 0.25) / np.sqrt(2))
-        planes = [_plane(self.mould, 0.5 * parity, self.clearance) for parity in range(min(self.layers, 2))]
         found = []
         for tether in self.mould.tethers:
-            paths = [smallest_loop(plane, centre_of(tether)) for plane in planes]
+            paths = [smallest_loop(plane, centre_of(tether)) for plane in self.planes]
             of_layers = [(start, paths[layer % 2]) for layer, start in enumerate(starts)]
             found.append([start + path for start, path in of_layers if path is not None])
         return found
@@ -162,21 +177,30 @@ def cast_sites(mould: Mould, layers: int, clearance: float = CLEARANCE) -> NDArr
     RaptorError
         If there is none.
     """
-    planes = [_plane(mould, 0.5 * parity, clearance) for parity in range(min(layers, 2))]
+    return _stacked(_planes(mould, layers, clearance), layers)
+
+
+def _stacked(planes: Sequence[NDArray[np.float64]], layers: int) -> NDArray[np.float64]:
+    """Sites (cells, 3) of all layers."""
     heights = (np.arange(layers) + 0.5) / np.sqrt(2)
     parts = [
         np.column_stack([planes[layer % 2], np.full(len(planes[layer % 2]), height)])
         for layer, height in enumerate(heights)
     ]
-    sites = np.concatenate(parts)
-    if len(sites) == 0:
+    return np.concatenate(parts)
+
+
+def _planes(mould: Mould, layers: int, clearance: float) -> list[NDArray[np.float64]]:
+    """Sites (n, 2) of the even and of the odd layers; raises as `cast_sites`."""
+    planes = [_plane(mould, 0.5 * parity, clearance) for parity in range(min(layers, 2))]
+    if not any(map(len, planes)):
         x0, y0, x1, y1 = mould.outline.bounds
         larger = FITTED / max(x1 - x0, y1 - y0)
         raise RaptorError(
             f"{mould.name} holds no cell: no lattice site lies inside its depression; sites are 1 l0 "
             f"apart, so draw it larger, or give a scale up to {larger:.3g} times as large"
         )
-    return sites
+    return planes
 
 
 def central_section(mould: Mould) -> shapely.LineString:

@@ -18,6 +18,26 @@ BROKEN = 10.0
 """Violation of a vector that gives no outline at all."""
 
 
+class QuickCast(CastMould):
+    """A cast mould whose sites are found by shapes grown and shrunk by the clearance: ten times as fast."""
+
+    @cached_property
+    def planes(self) -> list[NDArray[np.float64]]:
+        """Sites (n, 2) of the even and of the odd layers, l0; empty where there is none."""
+        x = np.arange(-HALF_SPAN, HALF_SPAN + 1.0)
+        inner = self.mould.outline.buffer(-self.clearance)
+        shapely.prepare(inner)
+        planes = []
+        for parity in range(min(self.layers, 2)):
+            points = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2) + 0.5 * parity
+            points = points[np.abs(points).max(axis=1) < IMAGE_SIZE / 2]
+            points = points[shapely.contains_xy(inner, points[:, 0], points[:, 1])]
+            for tether in self.mould.tethers:
+                points = points[~_within(tether, points, self.clearance)]
+            planes.append(points)
+        return planes
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A vector's mould, and by how much it violates the process; no mould where it cannot be made."""
@@ -25,11 +45,11 @@ class Candidate:
     cast: CastMould | None
     violation: float
 
-    @cached_property
+    @property
     def cells(self) -> int:
-        """Number of cells, as `CastMould.n_cells` in a tenth of the time."""
+        """Number of cells."""
         assert self.cast is not None
-        return count_cells(self.cast)
+        return self.cast.n_cells
 
 
 def decode(
@@ -45,7 +65,7 @@ def decode(
         return Candidate(None, violation)
     try:
         mould = Mould(made.outline, made.tethers, mm_per_l0=spec.mm_per_l0)
-        cast = CastMould(mould, layers, pixels, clearance)
+        cast = QuickCast(mould, layers, pixels, clearance)
         return Candidate(cast if cast.image.depression.any() else None, 0.0)
     except RaptorError:
         return Candidate(None, BROKEN)
@@ -57,22 +77,6 @@ def violation_of(made: Draft, spec: DesignSpec, layers: int) -> float:
     missing = float(max(low - len(made.tethers), len(made.tethers) - high, 0))
     cells = layers * (made.outline.area - sum(tether.area for tether in made.tethers))
     return float(missing + max(0.9 * spec.mould_cells[0] / max(cells, 1.0) - 1, 0.0))
-
-
-def count_cells(cast: CastMould) -> int:
-    """Number of sites at least the clearance from walls, by shapes grown and shrunk by it."""
-    clearance, x = cast.clearance, np.arange(-HALF_SPAN, HALF_SPAN + 1.0)
-    inner = cast.mould.outline.buffer(-clearance)
-    shapely.prepare(inner)
-    total = 0
-    for parity in range(min(cast.layers, 2)):
-        points = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2) + 0.5 * parity
-        points = points[np.abs(points).max(axis=1) < IMAGE_SIZE / 2]
-        points = points[shapely.contains_xy(inner, points[:, 0], points[:, 1])]
-        for tether in cast.mould.tethers:
-            points = points[~_within(tether, points, clearance)]
-        total += len(points) * len(range(parity, cast.layers, 2))
-    return total
 
 
 def _within(tether: Tether, points: NDArray[np.float64], distance: float) -> NDArray[np.bool_]:

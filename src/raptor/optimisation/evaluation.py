@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raptor.fields.resample import coarse_masks
+from raptor.fields.resample import coarse_images
 from raptor.moulds.cast import CastMould
-from raptor.optimisation.casting import Candidate, count_cells, decode
+from raptor.optimisation.casting import Candidate, decode
 from raptor.optimisation.measures import View, all_held, measure
 from raptor.optimisation.spec import DesignSpec
 from raptor.raster import density_threshold
@@ -85,7 +85,7 @@ class Evaluator:
     def _outcomes(self, casts: Sequence[CastMould], count: int) -> NDArray[np.float32]:
         """Fields (n, count, 8, y', x') of moulds, per pixel of the networks' raster."""
         pixels = self.surrogate.architecture.pixels
-        images, cells = zip(*((coarse_masks(cast, pixels), count_cells(cast)) for cast in casts), strict=True)
+        images, cells = zip(*((coarse_images(cast, pixels), cast.n_cells) for cast in casts), strict=True)
         found = outcomes(self.surrogate, np.stack(images), cells, self.spec.parameters, count)
         return found * np.float32((self.surrogate.pixels / pixels) ** 2)
 

@@ -15,7 +15,6 @@ from raptor.fields.tethers import OPEN
 from raptor.frame import pixel_centres, pixel_size
 from raptor.moulds.cast import CastMould
 from raptor.moulds.raster import tether_depth
-from raptor.optimisation.casting import count_cells
 from raptor.optimisation.spec import DIMENSION, Measured
 from raptor.raster import density_threshold
 
@@ -182,6 +181,6 @@ OF_EDGE: dict[str, Callable[[NDArray[np.floating], float, View], float]] = {
 OF_MOULD: dict[str, Callable[[View], float]] = {
     "mould_length": lambda view: view.long,
     "mould_width": lambda view: view.short,
-    "cells": lambda view: float(count_cells(view.cast)),
+    "cells": lambda view: float(view.cast.n_cells),
     "tethers": lambda view: float(len(view.cast.mould.tethers)),
 }

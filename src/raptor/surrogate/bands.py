@@ -86,7 +86,9 @@ class Calibration:
         The training set, to which the distance of inputs is measured.
     threshold_factor : float
         Factor of the density above which there is tissue in means: their edges are blurred, which moves the
-        contour at the simulations' threshold outwards. Samples are measured at that of simulations.
+        contour at the simulations' threshold outwards.
+    own_factor : float
+        The same of realisations: samples, whose edges are nearly sharp, or the means of single networks.
     """
 
     fields: ErrorScale
@@ -94,6 +96,7 @@ class Calibration:
     usual_disagreement: float
     training: TrainingSet
     threshold_factor: float = 1.0
+    own_factor: float = 1.0
 
     def relative_disagreement(self, deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:
         """`disagreement` over its usual value."""
@@ -108,6 +111,7 @@ class Calibration:
             "usual_disagreement": self.usual_disagreement,
             "usual_distance": self.training.usual,
             "threshold_factor": self.threshold_factor,
+            "own_factor": self.own_factor,
         }
 
     @classmethod
@@ -118,7 +122,8 @@ class Calibration:
             for part in (content["fields"], content["measures"])
         )
         training = TrainingSet(points, content["usual_distance"])
-        return cls(fields, measures, content["usual_disagreement"], training, content["threshold_factor"])
+        known = (content[name] for name in ("threshold_factor", "own_factor"))
+        return cls(fields, measures, content["usual_disagreement"], training, *known)
 
 
 def disagreement(deviation: NDArray[np.floating], fields: NDArray[np.floating]) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.dataset.examples import Example, transform_sample
-from raptor.dataset.scaling import scale_inputs
+from raptor.dataset.scaling import scaled_parameters
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.resample import block_average
 from raptor.moulds.cast import CastMould
@@ -110,5 +110,5 @@ def _images(stack: Path, examples: list[Example]) -> Iterator[tuple[Sample, Elem
 
 def _key(sample: Sample) -> NDArray[np.float32]:
     """Coarse masks, then scaled parameters, as one vector."""
-    inputs = scale_inputs(sample.depression, sample.tethers, sample.parameters)
-    return np.concatenate([block_average(inputs[:2], COARSE).ravel(), inputs[2:, 0, 0]])
+    masks = block_average(2.0 * np.stack([sample.depression, sample.tethers]) - 1.0, COARSE)
+    return np.concatenate([masks.ravel(), scaled_parameters(sample.parameters)]).astype(np.float32)

@@ -13,8 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import atomic_path, read_json, write_json
 from raptor.core.version import MODEL_VERSION
 from raptor.dataset.netcdf import LICENCE
-from raptor.dataset.scaling import Scaling
-from raptor.moulds.geometry import CLEARANCE, STRICTLY
+from raptor.dataset.scaling import INPUTS, Scaling
 from raptor.surrogate.bands import Calibration
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
@@ -53,6 +52,7 @@ def save(
         "identity": identity,
         "ensemble_size": len(surrogate.members),
         "architecture": surrogate.architecture.model_dump(),
+        "inputs": list(INPUTS),
         "normalisation": surrogate.scaling.as_json(),
         "layers": surrogate.layers,
         "pixels": surrogate.pixels,
@@ -89,10 +89,14 @@ def load(folder: Path) -> Surrogate:
         architecture = Architecture.model_validate(content["architecture"])
         scaling = Scaling.from_json(content["normalisation"])
         layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "ensemble_size"))
-        # Before model version 3 cells stood right at the walls.
-        clearance = CLEARANCE if int(content["model_version"]) >= 3 else STRICTLY
+        inputs = content.get("inputs", [])
     except (ValueError, KeyError, TypeError) as error:
         raise RaptorError(f"{folder / MODEL} cannot be read: {error}") from error
+    if inputs != list(INPUTS):
+        raise RaptorError(
+            f"{folder / MODEL} was trained by another version, whose networks do not see "
+            f"{', '.join(INPUTS)}; train it again, or use that version of raptor"
+        )
     tensors, identity = _read_tensors(folder / WEIGHTS)
     members = [Generator(architecture, scaling) for _ in range(count)]
     try:
@@ -107,7 +111,7 @@ def load(folder: Path) -> Surrogate:
             f"{folder / WEIGHTS} does not fit the model that model.json describes; "
             f"keep the two files of one training together ({str(error).splitlines()[0]})"
         ) from error
-    return Surrogate(tuple(members), architecture, scaling, layers, pixels, calibration, clearance)
+    return Surrogate(tuple(members), architecture, scaling, layers, pixels, calibration)
 
 
 def _read_tensors(path: Path) -> tuple[dict[str, Tensor], str | None]:

@@ -22,7 +22,7 @@ class Generator(nn.Module):
         self.physical = PhysicalFields(scaling) if architecture.network in PHYSICAL else None
 
     def forward(self, inputs: Tensor, cells: Tensor, noise: Tensor | None = None) -> Tensor:
-        """Fields (n, 8, y, x) from inputs (n, 5, y, x), numbers of cells (n,) and optional noise (n, k)."""
+        """Fields (n, 8, y, x) from inputs (n, 6, y, x), numbers of cells (n,) and optional noise (n, k)."""
         found: Tensor = self.network(inputs) if noise is None else self.network(inputs, noise)
         if self.physical is None:
             return found
@@ -55,5 +55,5 @@ class Generator(nn.Module):
 
 
 def delta_of(inputs: Tensor) -> Tensor:
-    """Delta (n,) of scaled inputs (n, 5, y, x)."""
+    """Delta (n,) of scaled inputs (n, 6, y, x)."""
     return DELTA.middle + DELTA.half * inputs[:, INPUTS.index("delta"), 0, 0]

@@ -13,7 +13,7 @@ from torch.nn.functional import interpolate
 from raptor.core.errors import RaptorError
 from raptor.dataset.scaling import Scaling, scale_inputs
 from raptor.fields.metrics import without_sign
-from raptor.fields.resample import coarse_masks, deconvolve
+from raptor.fields.resample import coarse_images, deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import CLEARANCE, Mould
@@ -70,8 +70,9 @@ class Surrogate:
 
     @property
     def own_threshold(self) -> float:
-        """The same in realisations: samples have edges as sharp as simulations, other means are blurred."""
-        return density_threshold(self.layers, self.pixels) if self.architecture.noise else self.threshold
+        """The same in realisations: in each sample, or in each network's mean."""
+        factor = 1.0 if self.calibration is None else self.calibration.own_factor
+        return factor * density_threshold(self.layers, self.pixels)
 
     @property
     def weights(self) -> int:
@@ -209,24 +210,27 @@ class Surrogate:
         return shape_ratios(density, cast, self.threshold)
 
     def noise(self, images: int) -> list[Tensor]:
-        """Of each network, noise (images, numbers) for as many images: the same in every prediction."""
-        stream = torch.Generator().manual_seed(0)
-        return [torch.randn(images, self.architecture.noise, generator=stream) for _ in self.members]
+        """Of each network, noise (images, numbers) for as many images: the same in every prediction.
+
+        That of the second half is opposite to the first's, which brings the mean of few samples nearer to
+        that of many (antithetic variates).
+        """
+        stream, numbers = torch.Generator().manual_seed(0), self.architecture.noise
+        halves = [torch.randn(-(-images // 2), numbers, generator=stream) for _ in self.members]
+        return [torch.cat([half, -half])[:images] for half in halves]
 
     def _images(self, cast: CastMould, elements: Sequence[Element]) -> list[NDArray[np.float32]]:
-        """Masks (2, y', x') of a mould's images under D4 on the networks' raster."""
-        masks = coarse_masks(cast, self.architecture.pixels)
-        return [np.ascontiguousarray(move_pixels(masks, element)) for element in elements]
+        """What networks see (3, y', x') of a mould's images under D4."""
+        seen = coarse_images(cast, self.architecture.pixels)
+        return [np.ascontiguousarray(move_pixels(seen, element)) for element in elements]
 
     def _inputs(
         self, cast: CastMould, cells: Sequence[CellParameters], images: Sequence[NDArray[np.float32]]
     ) -> tuple[Tensor, Tensor]:
-        """Scaled inputs (n * images, 5, y', x') and numbers of cells."""
+        """Scaled inputs (n * images, 6, y', x') and numbers of cells."""
         for parameters in cells:
             parameters.require_sampled("prediction")
-        inputs = torch.from_numpy(
-            np.stack([scale_inputs(masks[0], masks[1], p) for p in cells for masks in images])
-        )
+        inputs = torch.from_numpy(np.stack([scale_inputs(image, p) for p in cells for image in images]))
         # Fields are per pixel of the full raster; the networks give their block averages.
         return inputs, torch.full((len(inputs),), cast.n_cells * (images[0].shape[-1] / self.pixels) ** 2)
 
@@ -242,7 +246,7 @@ class Surrogate:
         places, noise = list(range(len(images))), self.noise(len(images))
         if not self.architecture.noise:  # of images that repeat, as a symmetric mould's do, one is enough
             numbers: dict[bytes, int] = {}
-            places = [numbers.setdefault(masks.tobytes(), len(numbers)) for masks in images]
+            places = [numbers.setdefault(image.tobytes(), len(numbers)) for image in images]
             images, noise = [images[places.index(n)] for n in range(len(numbers))], self.noise(len(numbers))
         inputs, counts = self._inputs(cast, cells, images)
         with torch.no_grad():

@@ -16,6 +16,7 @@ from raptor.surrogate.losses import (
     sample_loss,
 )
 from raptor.surrogate.networks import Discriminator
+from raptor.surrogate.recording import Recorded
 from raptor.surrogate.rules import Architecture, TrainingRules
 
 SAMPLES = 2
@@ -53,7 +54,7 @@ class Learner:
         device: torch.device,
     ) -> None:
         torch.manual_seed(seed)
-        self.rules, self.scaling = rules, scaling
+        self.rules, self.scaling, self.device = rules, scaling, device
         self.generator = Generator(architecture, scaling)
         self.keeps_moments = False
         networks: dict[str, nn.Module] = {"generator": self.generator}
@@ -65,9 +66,16 @@ class Learner:
         self.networks = networks
         beta1 = BETA1.get(architecture.network, 0.9)
         self.optimisers = {
-            name: torch.optim.Adam(network.parameters(), rules.learning_rate, (beta1, 0.999))
+            name: torch.optim.Adam(
+                network.parameters(),
+                torch.tensor(rules.learning_rate, device=device),  # which a recorded step reads anew
+                (beta1, 0.999),
+                fused=all(map(torch.is_floating_point, network.parameters())) or None,  # fno's are complex
+                capturable=device.type == "cuda",
+            )
             for name, network in networks.items()
         }
+        self._recorded = Recorded(self._step)
 
     def start_epoch(self, epoch: int) -> None:
         """Set training mode and the learning rate: constant, then linearly to zero."""
@@ -75,13 +83,20 @@ class Learner:
         for name, network in self.networks.items():
             network.train()
             for group in self.optimisers[name].param_groups:
-                group["lr"] = rate
+                group["lr"].fill_(rate)
         if self.keeps_moments:
             for norm in self.generator.normalisations():
                 norm.eval()
 
+    def keep_moments(self) -> None:
+        """Let batch normalisation use the moments that it has from the next epoch on."""
+        self.keeps_moments, self._recorded = True, Recorded(self._step)
+
     def step(self, inputs: Tensor, target: Tensor) -> Tensor:
         """Update the discriminator, if any, then the generator, on scaled pairs; returns `LOSSES` (3,)."""
+        return self._recorded(inputs, target)
+
+    def _step(self, inputs: Tensor, target: Tensor) -> Tensor:
         cells, delta = cells_of(target, self.scaling), delta_of(inputs)
         if self.generator.noise:
             noise = torch.randn(SAMPLES * len(inputs), self.generator.noise, device=inputs.device)
@@ -137,6 +152,8 @@ class Learner:
         for name, network in self.networks.items():
             network.load_state_dict(state["networks"][name])
             self.optimisers[name].load_state_dict(state["optimisers"][name])
+            for group in self.optimisers[name].param_groups:
+                group["lr"] = group["lr"].to(self.device)
 
 
 def cells_of(fields: Tensor, scaling: Scaling) -> Tensor:

@@ -30,7 +30,7 @@ class OnnxNetworks:
     Parameters
     ----------
     graph : bytes
-        ONNX model from inputs (n, 5, y, x), cells (n,) and, of networks that sample, noise (n, k) to fields
+        ONNX model from inputs (n, 6, y, x), cells (n,) and, of networks that sample, noise (n, k) to fields
         (n, 8, y, x), all scaled as `Generator` has them. Its weights are external data called `WEIGHTS`,
         float32.
     weights : tuple of bytes

@@ -14,7 +14,7 @@ from raptor.symmetry import Element, apply, move_pixels
 
 def outcomes(
     surrogate: Surrogate,
-    masks: NDArray[np.float32],
+    images: NDArray[np.float32],
     cells: Sequence[int],
     parameters: CellParameters,
     count: int = 1,
@@ -27,8 +27,8 @@ def outcomes(
 
     Parameters
     ----------
-    masks : ndarray (n, 2, y', x')
-        Depression and tethers, block averages on the networks' raster.
+    images : ndarray (n, 3, y', x')
+        What networks see of each mould: `resample.coarse_images`.
     cells : sequence of int
         Number of cells in each mould.
 
@@ -40,16 +40,14 @@ def outcomes(
     parameters.require_sampled("prediction")
     pixels, noise = surrogate.architecture.pixels, surrogate.noise(len(Element.all()))
     totals = torch.tensor(cells, dtype=torch.float32) * (pixels / surrogate.pixels) ** 2
-    found = np.empty((len(masks), count, 8, pixels, pixels), np.float32)
+    found = np.empty((len(images), count, 8, pixels, pixels), np.float32)
     for number in range(count):
         turn, member = divmod(number, len(surrogate.members))
         element = Element.from_index((turn + member) % 8)
-        for start in range(0, len(masks), BATCH):
+        for start in range(0, len(images), BATCH):
             part = slice(start, start + BATCH)
-            moved = move_pixels(masks[part], element)
-            inputs = torch.from_numpy(
-                np.stack([scale_inputs(depression, tethers, parameters) for depression, tethers in moved])
-            )
+            moved = move_pixels(images[part], element)
+            inputs = torch.from_numpy(np.stack([scale_inputs(image, parameters) for image in moved]))
             own = noise[member][element.index].expand(len(inputs), -1)
             with torch.no_grad():
                 scaled = surrogate.members[member](inputs, totals[part], own if own.shape[1] else None)

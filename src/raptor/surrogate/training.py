@@ -31,6 +31,12 @@ nearly cancels where nothing pulls, so their errors say little about the network
 SETTLING = 100
 """Batches from which the moments of batch normalisation are taken at the end."""
 
+SAVING = 15.0
+"""Seconds between checkpoints, at least: on a GPU a pass takes less than a second."""
+
+VALIDATION_BATCH = 256
+"""Examples at a time in validation: without gradients more of them fit."""
+
 VALIDATION_SAMPLES = 4
 """Samples of each validation example, for networks that sample."""
 
@@ -82,22 +88,26 @@ def train(
     # with the former alone give wild samples in prediction, some with 20 times the deviation.
     keeping = rules.epochs // 2 if architecture.noise else rules.epochs
     history, best = _resume(learner, checkpoint, identity)
+    saved = -np.inf
     for epoch in range(len(history), rules.epochs):
         if epoch == keeping:
             _settle(learner.generator, training, rules.batch_size, seed, place)
-        learner.keeps_moments = epoch >= keeping
+        if epoch >= keeping and not learner.keeps_moments:
+            learner.keep_moments()
         row = _train_epoch(learner, training, validation, seed, epoch, place)
         earlier = history[keeping:] if learner.keeps_moments else history
         if row["validation_error"] < min((r["validation_error"] for r in earlier), default=np.inf):
             best = {k: v.detach().cpu().clone() for k, v in learner.generator.state_dict().items()}
         history.append(row)
-        with atomic_path(checkpoint) as temporary:
+        if time.monotonic() - saved > SAVING or epoch == rules.epochs - 1:
             state = {"identity": identity, "learner": learner.state_dict(), "history": history, "best": best}
-            torch.save(state, temporary)
+            with atomic_path(checkpoint) as temporary:
+                torch.save(state, temporary)
+            saved = time.monotonic()
         log.info("%s", ", ".join(f"{key} {value:.4g}" for key, value in row.items()))
         on_progress(epoch, row)
     learner.generator.load_state_dict(best)
-    if not learner.keeps_moments:
+    if keeping == rules.epochs:
         _settle(learner.generator, training, rules.batch_size, seed, place)
     return Trained(learner.generator.cpu().eval(), pd.DataFrame(history))
 
@@ -107,6 +117,8 @@ def _prepare(device: str) -> torch.device:
     torch.set_num_threads(1)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # needed for reproducible cuBLAS
     torch.use_deterministic_algorithms(True, warn_only=True)
+    # Nothing here reads memory before it is written, and filling it takes a GPU a quarter of its time.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     torch.backends.cudnn.benchmark = False
     return torch.device(device)
 
@@ -145,10 +157,12 @@ def _train_epoch(
     if len(order) % size == 1 and len(order) > 1:
         order.pop()  # batch normalisation needs more than one example
     learner.start_epoch(epoch)
-    losses = torch.stack([learner.step(*batch) for batch in training.batches(order, size, device)])
+    losses = torch.stack(
+        [learner.step(*batch) for batch in training.batches(order, size, device, shifted=True)]
+    )
     # Read once per epoch, so that a GPU does not wait for the processor at every step.
     row = {"epoch": epoch, **dict(zip(LOSSES, losses.mean(0).tolist(), strict=True))}
-    row["validation_error"] = validation_error(learner.generator, validation, size, device)
+    row["validation_error"] = validation_error(learner.generator, validation, device)
     row["seconds"] = time.perf_counter() - started
     if not np.isfinite(list(row.values())).all():
         raise RaptorError(
@@ -184,9 +198,7 @@ def _settle(
     generator.eval()
 
 
-def validation_error(
-    generator: Generator, examples: ExampleSet, batch_size: int, device: torch.device
-) -> float:
+def validation_error(generator: Generator, examples: ExampleSet, device: torch.device) -> float:
     """Mean over the fields `SCORED` of the VRMSE over all samples together, each in its first image.
 
     Error and variance are summed over the samples before division, so that a sample in which nothing
@@ -199,7 +211,7 @@ def validation_error(
     error, variance = torch.zeros(2, len(SCORED), dtype=torch.float64, device=device)
     first = [numbers[0] for numbers in examples.images.values()]
     with torch.no_grad():
-        for inputs, target in examples.batches(first, batch_size, device):
+        for inputs, target in examples.batches(first, VALIDATION_BATCH, device):
             cells, wanted = cells_of(target, examples.scaling), target[:, SCORED].double()
             answers = generator.answers(inputs, cells, VALIDATION_SAMPLES, stream)[:, :, SCORED].double()
             if generator.noise:

@@ -122,6 +122,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "physical": surrogate.members[0].physical is not None,
         "clearance": surrogate.clearance,
         "threshold": surrogate.threshold,
+        "own_threshold": surrogate.own_threshold,
         "cast_threshold": density_threshold(surrogate.layers, surrogate.pixels),
         "fields": FIELDS,
         "scaling": {"offset": surrogate.scaling.offset, "scale": surrogate.scaling.scale},

@@ -1,4 +1,4 @@
-"""Networks from scaled inputs (n, 5, y, x) to eight channels (n, 8, y, x), by name.
+"""Networks from scaled inputs (n, 6, y, x) to eight channels (n, 8, y, x), by name.
 
 To add one, write its module, and list it here and in `rules.Architecture`.
 """

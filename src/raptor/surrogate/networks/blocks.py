@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from raptor.dataset.scaling import INPUTS
 
-MASKS = 2
+IMAGES = 3
 """Input channels that are images; the others are constants."""
 
 EMBEDDING = 64
@@ -19,11 +19,11 @@ NOISE_WEIGHT = 0.05
 
 
 class ParameterEmbedding(nn.Module):
-    """Embeds the parameters of scaled inputs (n, 5, y, x), and noise if any, in (n, EMBEDDING) numbers."""
+    """Embeds the parameters of scaled inputs (n, 6, y, x), and noise if any, in (n, EMBEDDING) numbers."""
 
     def __init__(self, noise: int = 0) -> None:
         super().__init__()
-        first, second = nn.Linear(len(INPUTS) - MASKS, EMBEDDING), nn.Linear(EMBEDDING, EMBEDDING)
+        first, second = nn.Linear(len(INPUTS) - IMAGES, EMBEDDING), nn.Linear(EMBEDDING, EMBEDDING)
         self.layers = nn.Sequential(first, nn.SiLU(), second, nn.SiLU())
         self.noise = nn.Linear(noise, EMBEDDING, bias=False) if noise else None
         if self.noise is not None:
@@ -31,7 +31,7 @@ class ParameterEmbedding(nn.Module):
 
     def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
         """Reads the constant images of the parameters at one pixel; noise is (n, numbers)."""
-        features: Tensor = self.layers[0](inputs[:, MASKS:, 0, 0])
+        features: Tensor = self.layers[0](inputs[:, IMAGES:, 0, 0])
         if self.noise is not None:
             features = features + self.noise(noise)
         embedding: Tensor = self.layers[1:](features)

@@ -9,7 +9,7 @@ from itertools import pairwise
 from torch import Tensor, nn
 from torch.nn.functional import interpolate, pixel_shuffle, pixel_unshuffle, silu
 
-from raptor.surrogate.networks.blocks import MASKS, FilmNorm, ParameterEmbedding
+from raptor.surrogate.networks.blocks import IMAGES, FilmNorm, ParameterEmbedding
 from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS
 
@@ -55,13 +55,13 @@ class ResidualBlock(nn.Module):
 
 
 class FilmUNet(nn.Module):
-    """From scaled inputs (n, 5, y, x) to eight free channels (n, 8, y, x) for `PhysicalFields`."""
+    """From scaled inputs (n, 6, y, x) to eight free channels (n, 8, y, x) for `PhysicalFields`."""
 
     def __init__(self, base_channels: int, noise: int = 0) -> None:
         super().__init__()
         widths = [base_channels * width for width in WIDTHS]
         self.embed = ParameterEmbedding(noise)
-        self.stem = FilmConvolution(MASKS * SQUARE**2, widths[0])
+        self.stem = FilmConvolution(IMAGES * SQUARE**2, widths[0])
         self.encoder = nn.ModuleList(ResidualBlock(width) for width in widths)
         self.down = nn.ModuleList(FilmConvolution(a, b, stride=2) for a, b in pairwise(widths))
         self.up = nn.ModuleList(FilmConvolution(b, a) for a, b in pairwise(widths))
@@ -72,7 +72,7 @@ class FilmUNet(nn.Module):
     def forward(self, inputs: Tensor, noise: Tensor | None = None) -> Tensor:
         """Free channels; one sample if there is noise (n, numbers)."""
         embedding = self.embed(inputs, noise)
-        features = silu(self.stem(pixel_unshuffle(inputs[:, :MASKS], SQUARE), embedding))
+        features = silu(self.stem(pixel_unshuffle(inputs[:, :IMAGES], SQUARE), embedding))
         skips = []
         for level, residual in enumerate(self.encoder):
             features = residual(features, embedding)

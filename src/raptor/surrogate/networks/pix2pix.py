@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from raptor.dataset.scaling import INPUTS
-from raptor.surrogate.networks.blocks import MASKS, FilmNorm, ParameterEmbedding
+from raptor.surrogate.networks.blocks import IMAGES, FilmNorm, ParameterEmbedding
 from raptor.surrogate.rules import Architecture
 from raptor.symmetry import FIELDS
 
@@ -56,7 +56,7 @@ class Up(nn.Sequential):
 
 
 class UNet(nn.Module):
-    """A U-Net with skip connections, from inputs (n, 5, y, x) to fields (n, 8, y, x), both scaled.
+    """A U-Net with skip connections, from inputs (n, 6, y, x) to fields (n, 8, y, x), both scaled.
 
     With an embedding, parameters modulate its features and its first layer sees only the masks.
     """
@@ -67,7 +67,7 @@ class UNet(nn.Module):
         depth = int(math.log2(pixels))
         channels = [base_channels * min(2**level, WIDEST) for level in range(depth)]
         self.embed = embed
-        self.inputs = MASKS if film else len(INPUTS)
+        self.inputs = IMAGES if film else len(INPUTS)
         self.down = nn.ModuleList()
         for level, (before, after) in enumerate(zip([self.inputs, *channels[:-1]], channels, strict=True)):
             inner = 0 < level < depth - 1
@@ -117,7 +117,7 @@ class Discriminator(nn.Module):
         initialise(self)
 
     def forward(self, inputs: Tensor, fields: Tensor) -> Tensor:
-        """Logits (n, 1, y', x') that fields (n, 8, y, x) were simulated, of inputs (n, 5, y, x)."""
+        """Logits (n, 1, y', x') that fields (n, 8, y, x) were simulated, of inputs (n, 6, y, x)."""
         return self.layers(torch.cat([inputs, fields], dim=1))  # type: ignore[no-any-return]
 
 

@@ -7,13 +7,12 @@ export interface Parts {
   engine: Uint8Array; // onnxruntime's WebAssembly
   graph: Uint8Array;
   refine: Uint8Array; // empty if the networks work at full resolution
-  weights: Uint8Array[]; // float16, of each member
+  weights: Uint8Array[]; // float16 of each member: all low bytes, then all high ones
 }
 
-/** Float16 numbers as the bytes of float32 ones. */
+/** Float16 numbers, as `Parts.weights` has them, as the bytes of float32 ones. */
 function widened(half: Uint8Array): Uint8Array {
-  const from = new Uint16Array(half.buffer, half.byteOffset, half.byteLength / 2);
-  const to = new Uint32Array(from.length);
+  const count = half.length / 2, to = new Uint32Array(count);
   const table = new Float32Array(65536);
   for (let h = 0; h < 65536; h++) {
     const exponent = (h >> 10) & 31, fraction = h & 1023;
@@ -21,7 +20,7 @@ function widened(half: Uint8Array): Uint8Array {
     table[h] = h & 32768 ? -size : size;
   }
   const bits = new Uint32Array(table.buffer);
-  for (let i = 0; i < from.length; i++) to[i] = bits[from[i]];
+  for (let i = 0; i < count; i++) to[i] = bits[half[i] | (half[count + i] << 8)];
   return new Uint8Array(to.buffer);
 }
 
@@ -41,7 +40,7 @@ export async function load(model: Model, parts: Parts): Promise<Networks> {
     async run(member, inputs, cells, noise) {
       const pixels = model.network_pixels;
       const feeds: Record<string, ort.Tensor> = {
-        inputs: new ort.Tensor("float32", inputs, [1, 5, pixels, pixels]),
+        inputs: new ort.Tensor("float32", inputs, [1, inputs.length / pixels ** 2, pixels, pixels]),
         cells: new ort.Tensor("float32", Float32Array.of(cells), [1]),
       };
       if (noise) feeds.noise = new ort.Tensor("float32", noise, [1, noise.length]);

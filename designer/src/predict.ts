@@ -121,14 +121,15 @@ export class Predictor {
 
   /** Fields of one image by one member, moved back, in physical units, on the networks' raster. */
   private async answer(job: Job, cast: Cast, member: number, element: Element, noise: Float32Array | null) {
-    const { model } = this, pixels = model.network_pixels, size = pixels ** 2, inputs = new Float32Array(5 * size);
-    this.last!.images.forEach((mask, channel) => {
-      const moved = movePixels(mask, element);
+    const { model } = this, pixels = model.network_pixels, size = pixels ** 2, { images } = this.last!;
+    const inputs = new Float32Array((images.length + 3) * size);
+    images.forEach((image, channel) => {
+      const moved = movePixels(image, element);
       for (let p = 0; p < size; p++) inputs[channel * size + p] = 2 * moved[p] - 1;
     });
     (["delta", "kappa_nnn", "kappa_nnnn"] as const).forEach((name, row) => {
       const { lower, upper } = model.bounds[name];
-      inputs.fill((job.cells[name] - (upper + lower) / 2) / ((upper - lower) / 2), (2 + row) * size, (3 + row) * size);
+      inputs.fill((job.cells[name] - (upper + lower) / 2) / ((upper - lower) / 2), (images.length + row) * size, (images.length + row + 1) * size);
     });
     const scaled = await this.networks.run(member, inputs, cast.cells * (pixels / model.pixels) ** 2, noise);
     const { offset, scale } = model.scaling, fields = new Float32Array(scaled.length);

@@ -26,7 +26,7 @@ def coarse_images(cast: CastMould, pixels: int) -> NDArray[np.float32]:
     """What networks see of a mould (3, pixels, pixels): block averages of depression, tethers and density.
 
     The density is that as cast, over the density far from walls. It tells how the lattice meets the walls,
-    on which half of the variance between runs hangs (docs/surrogate.md).
+    which accounts for two fifths of what seems noise otherwise (docs/surrogate.md).
     """
     images: NDArray[np.float32] = block_average(
         np.stack([cast.depression, cast.tethers, cast.relative_density]).astype(np.float32), pixels

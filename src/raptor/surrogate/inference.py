@@ -59,8 +59,8 @@ class Surrogate:
     clearance: float = CLEARANCE
 
     def __post_init__(self) -> None:
-        for member in self.members:
-            member.eval()
+        for member in self.members:  # channels last: convolutions take a quarter less time
+            member.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     @cached_property
     def threshold(self) -> float:

@@ -54,7 +54,9 @@ class TrainingRules(Block):
         "null: train without one",
     )
     epochs: Positive = Field(
-        120, description="passes over the training runs, each in one of its images under D4, drawn at random"
+        120,
+        description="passes over the training runs, each in one of its images under D4 and at a place in the "
+        "frame, both drawn at random",
     )
     batch_size: int = Field(4, ge=2, description="examples per step")
     learning_rate: float = Field(

@@ -45,6 +45,13 @@ def test_a_split_without_examples_is_named(made):
         )
 
 
+def test_a_mould_that_is_not_given_is_named(made):
+    stack, known = made / "fields.nc", moulds_of(made)
+    known.pop(read_table(stack).mould[0])
+    with pytest.raises(RaptorError, match=r"^mould .* is not among the \d+ given; give those of the file"):
+        ExampleSet(stack, list_examples(stack), known, SCALING)
+
+
 def test_images_under_d4_are_those_of_the_symmetry():
     rng = torch.Generator().manual_seed(0)
     inputs, targets = torch.rand(8, 6, 16, 16, generator=rng), torch.rand(8, 8, 16, 16, generator=rng)

@@ -51,7 +51,7 @@ class ExampleSet(Dataset[Batch]):
     Raises
     ------
     RaptorError
-        If a stack cannot be read.
+        If a stack cannot be read, or one of its moulds is not given.
     """
 
     def __init__(
@@ -65,6 +65,12 @@ class ExampleSet(Dataset[Batch]):
         self.stacks = [stacks] if isinstance(stacks, Path) else list(stacks)
         tables = [read_table(stack) for stack in self.stacks]
         self.parameters = [values for table in tables for values in table.parameters]
+        unknown = {name for table in tables for name in table.mould} - moulds.keys()
+        if unknown:
+            raise RaptorError(
+                f"mould {min(unknown)} of the stacks is not among the {len(moulds)} given; give those of the "
+                "file moulds.geojson beside each stack"
+            )
         self.casts = [
             CastMould(moulds[name], table.layers, table.pixels) for table in tables for name in table.mould
         ]
@@ -143,7 +149,7 @@ class ExampleSet(Dataset[Batch]):
 def images_under(elements: Tensor, inputs: Tensor, targets: Tensor) -> Batch:
     """Inputs (n, 6, y, x) and targets (n, 8, y, x), each in its image under an element of D4, indices (n,).
 
-    All at once: element by element, a GPU would wait for the processor.
+    All at once: element by element, a GPU would wait for the processor's launches.
     """
     moves, channels, signs = (table[elements].to(inputs.device) for table in _tables(inputs.shape[-1]))
     each = torch.arange(len(inputs), device=inputs.device)[:, None, None]

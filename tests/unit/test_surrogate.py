@@ -367,3 +367,23 @@ def test_weights_that_do_not_fit_and_bad_requests_are_named(model_folder):
     (model_folder / "model.json").write_text("{}")
     with pytest.raises(RaptorError, match=r"model.json cannot be read"):
         load(model_folder)
+
+
+def test_weights_of_networks_that_see_other_images_are_refused(model_folder):
+    text = (model_folder / "model.json").read_text()
+    (model_folder / "model.json").write_text(text.replace('"as_cast",', ""))
+    with pytest.raises(
+        RaptorError, match=r"trained by another version.* do not see .*as_cast.*train it again"
+    ):
+        load(model_folder)
+
+
+def test_half_of_the_samples_have_opposite_noise():
+    architecture = Architecture(pixels=32, base_channels=4, noise=4)
+    members = tuple(Generator(architecture, SCALING) for _ in range(2))
+    surrogate = Surrogate(members, architecture, SCALING, 4, 32)
+    for own in surrogate.noise(8):
+        assert own.shape == (8, 4)
+        assert torch.equal(own[:4], -own[4:])
+    assert not torch.equal(*surrogate.noise(8))
+    assert surrogate.noise(3)[0].shape == (3, 4)

@@ -55,6 +55,7 @@ def model_card(
         "summaries": summaries,
         "regions": regions.to_dict("records"),
         "threshold_factor": surrogate.calibration.threshold_factor if surrogate.calibration else 1.0,
+        "own_factor": surrogate.calibration.own_factor if surrogate.calibration else 1.0,
         "levels": LEVELS,
         "quantities": (*FIELDS, *SHAPES),
         "delta": DELTA,

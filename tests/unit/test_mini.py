@@ -1,5 +1,7 @@
 """The small data set that is kept with the code, and what tells, loads and measures data sets."""
 
+import re
+
 import numpy as np
 import pytest
 import yaml
@@ -94,6 +96,12 @@ def test_the_tutorial_runs(monkeypatch):
     printed = executed("\n".join(python_blocks(ROOT / "docs" / "tutorial.md")))
     count = len(read_examples(CAMPAIGN / "examples.csv"))
     assert f"{count} examples; inputs (6, 64, 64), targets (8, 64, 64)" in printed
+
+
+def test_the_benchmark_of_places_on_the_lattice_prints_both_differences():
+    seeds, places = module("benchmarks.lattice_phase", CAMPAIGN, "--count", 1).splitlines()
+    assert re.fullmatch(r"seeds: density 0\.\d+, A/A0 0\.\d+, w/w0 (0\.\d+|nan), 1 moulds", seeds)
+    assert places.startswith("places: density 0.")
 
 
 def test_the_storage_benchmark_prints_its_tables():

@@ -36,7 +36,7 @@ from raptor.surrogate.bands import LEVELS
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-POINTS = 64  # Sobol points at which the surrogate is evaluated: others lie within 0.003 of them
+POINTS = 64  # Sobol points at which the surrogate is evaluated; interpolation errs by less than 0.003
 RATIO_ERROR = 0.01  # standard error of a measured area or width ratio
 DENSE = 2**16  # points of the posterior
 BANDED = 32  # points of a survey at which bands are computed

@@ -58,7 +58,7 @@ class Up(nn.Sequential):
 class UNet(nn.Module):
     """A U-Net with skip connections, from inputs (n, 6, y, x) to fields (n, 8, y, x), both scaled.
 
-    With an embedding, parameters modulate its features and its first layer sees only the masks.
+    With an embedding, parameters modulate its features and its first layer sees only the images.
     """
 
     def __init__(self, pixels: int, base_channels: int, embed: ParameterEmbedding | None = None) -> None:

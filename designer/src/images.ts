@@ -54,6 +54,44 @@ export function blockAverage(image: ArrayLike<number>, from: number, to: number)
   return mean;
 }
 
+const matrices: Record<string, Float64Array> = {};
+
+/** The matrix (to, from) that recovers one axis from block averages: Fourier modes over the transfer function. */
+function deconvolution(from: number, to: number): Float64Array {
+  const ratio = to / from, found = new Float64Array(to * from);
+  for (let i = 0; i < to; i++) {
+    for (let k = 0; k < from; k++) {
+      let sum = 1;
+      for (let wave = 1; wave < from / 2; wave++) {
+        const angle = (Math.PI * wave) / to;
+        const phase = angle * (2 * i - 2 * ratio * k - (ratio - 1));
+        sum += (2 * Math.cos(phase) * ratio * Math.sin(angle)) / Math.sin(ratio * angle);
+      }
+      found[i * from + k] = sum / from;
+    }
+  }
+  return found;
+}
+
+/** An image, smooth and zero at the border, from its block averages: the twin of raptor.fields.resample.deconvolve. */
+export function deconvolve(image: Float32Array, from: number, to: number): Float32Array {
+  if (from === to) return image;
+  const matrix = (matrices[`${from} ${to}`] ??= deconvolution(from, to));
+  const rows = new Float64Array(to * from), found = new Float32Array(to * to);
+  for (let y = 0; y < to; y++) {
+    for (let k = 0; k < from; k++) {
+      const weight = matrix[y * from + k];
+      for (let x = 0; x < from; x++) rows[y * from + x] += weight * image[k * from + x];
+    }
+    for (let x = 0; x < to; x++) {
+      let sum = 0;
+      for (let k = 0; k < from; k++) sum += matrix[x * from + k] * rows[y * from + k];
+      found[y * to + x] = sum;
+    }
+  }
+  return found;
+}
+
 /** An image enlarged by bilinear interpolation between pixel centres, constant beyond the outer ones. */
 export function enlarge(image: ArrayLike<number>, from: number, to: number): Float32Array {
   if (from === to) return Float32Array.from(image);

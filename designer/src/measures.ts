@@ -1,22 +1,25 @@
 // Directors, alignment and anisotropy from the fields: the twin of raptor.fields.directors.
 import type { Cast } from "./cast";
+import { deconvolve } from "./images";
 import type { Model } from "./model";
 
-function sums(fields: Float32Array, size: number) {
-  let xx = 0, yy = 0, xy = 0, sizes = 0;
+/** Alignment with the mould's long side, and local alignment in any direction, of fields (8, y, x). */
+export function alignmentAndAnisotropy(fields: Float32Array, cast: Cast, model: Model): [number, number] {
+  const size = fields.length / 8, pixels = Math.sqrt(size), along = new Float32Array(size), across = new Float32Array(size);
+  let xx = 0, yy = 0, xy = 0;
   for (let p = 0; p < size; p++) {
     const a = fields[2 * size + p], b = fields[3 * size + p], c = fields[5 * size + p];
     xx += a; yy += b; xy += c;
-    sizes += Math.hypot(a - b, 2 * c);
+    along[p] = a - b; across[p] = 2 * c;
   }
-  return { xx, yy, xy, sizes };
-}
-
-export function alignmentAndAnisotropy(fields: Float32Array, cast: Cast, size: number): [number, number] {
-  const { xx, yy, xy, sizes } = sums(fields, size);
+  const detail = Math.max(pixels, Math.min(model.constants.DETAIL, model.pixels)); // block averages mix directions
+  const [one, other] = [along, across].map((image) => deconvolve(image, pixels, detail));
+  let sizes = 0;
+  for (let p = 0; p < one.length; p++) sizes += Math.hypot(one[p], other[p]);
+  sizes *= (pixels / detail) ** 2;
   const length = Math.hypot(...cast.half), cosine = cast.half[0] / length, sine = cast.half[1] / length;
-  const along = (cosine ** 2 - sine ** 2) * (xx - yy) + 4 * cosine * sine * xy;
-  return xx + yy > 0 ? [along / (xx + yy), sizes / (xx + yy)] : [NaN, NaN];
+  const aligned = (cosine ** 2 - sine ** 2) * (xx - yy) + 4 * cosine * sine * xy;
+  return xx + yy > 0 ? [aligned / (xx + yy), sizes / (xx + yy)] : [NaN, NaN];
 }
 
 export interface Director { x: number; y: number; angle: number; anisotropy: number }

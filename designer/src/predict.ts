@@ -85,16 +85,16 @@ export class Predictor {
         answers[member].push(withoutSign(answer));
       }
     }
-    const middle = mean(answers.flat()), small = model.network_pixels ** 2;
+    const middle = mean(answers.flat());
     const fields = await this.finish(middle, cast, true);
     const numbers = this.numbers(fields, cast);
-    [numbers.alignment, numbers.anisotropy] = alignmentAndAnisotropy(middle, cast, small);
+    [numbers.alignment, numbers.anisotropy] = alignmentAndAnisotropy(middle, cast, model);
     if (!job.whole) return { fields, deviation: null, samples: [], numbers };
     const threshold = model.own_threshold;
     const each: number[][] = [], enclosed: number[][] = [];
     for (const own of sampled ? answers.flat() : answers.map(mean)) {
       const density = await this.density(own, cast);
-      each.push([...ratios(density, cast, model, threshold), ...alignmentAndAnisotropy(own, cast, small)]);
+      each.push([...ratios(density, cast, model, threshold), ...alignmentAndAnisotropy(own, cast, model)]);
       enclosed.push(held(density, cast, model, threshold));
     }
     const columns = [0, 1, 2, 3].map((k) => each.map((row) => row[k]));
@@ -157,7 +157,7 @@ export class Predictor {
 
   private numbers(fields: Float32Array, cast: Cast, threshold = this.model.threshold): Numbers {
     const size = this.model.pixels ** 2, density = fields.subarray(0, size);
-    const [alignment, anisotropy] = alignmentAndAnisotropy(fields, cast, size);
+    const [alignment, anisotropy] = alignmentAndAnisotropy(fields, cast, this.model);
     return {
       cells: cast.cells, ratios: ratios(density, cast, this.model, threshold), bands: null, alignment, anisotropy,
       held: held(density, cast, this.model, threshold), distance: 0, disagreement: null, unusual: "",

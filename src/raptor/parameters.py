@@ -4,8 +4,10 @@ Units: the nearest-neighbour bond length l0 and spring constant kappa0 are 1; ev
 dimensionless.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, sqrt
+from typing import Any
 
 from raptor.core.errors import RaptorError
 
@@ -45,6 +47,10 @@ class Bounds:
 DELTA = Bounds(0.05, 0.95)
 KAPPA_NNN = Bounds(0.1, 0.71)
 KAPPA_NNNN = Bounds(0.01, 0.5)
+LAYERS = 7
+"""Layers of a tissue where nothing else is said: those of the shipped surrogate."""
+BOUNDS = {"delta": DELTA, "kappa_nnn": KAPPA_NNN, "kappa_nnnn": KAPPA_NNNN}
+"""Of each parameter, in the order of `CellParameters`."""
 
 
 def largest_kappa_nnnn(kappa_nnn: float) -> float:
@@ -89,11 +95,7 @@ class CellParameters:
         RaptorError
             If a parameter lies outside the box used for sampling, prediction and fitting.
         """
-        for name, bounds in (
-            ("delta", DELTA),
-            ("kappa_nnn", KAPPA_NNN),
-            ("kappa_nnnn", KAPPA_NNNN),
-        ):
+        for name, bounds in BOUNDS.items():
             value = getattr(self, name)
             if not bounds.lower <= value <= bounds.upper:
                 raise RaptorError(
@@ -152,6 +154,11 @@ class NetworkModel:
             )
         if self.tension not in ("hooke", "literal"):
             raise RaptorError(f"tension is '{self.tension}'; allowed are hooke and literal")
+
+    @classmethod
+    def configured(cls, content: Mapping[str, Any]) -> "NetworkModel":
+        """From a configuration's layers, shells and tension."""
+        return cls(content["layers"], tuple(content["shells"]), content["tension"])
 
     @property
     def height(self) -> float:

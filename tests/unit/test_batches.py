@@ -39,7 +39,7 @@ def test_examples_kept_in_memory_are_those_read_from_files(made):
 
 def test_a_split_without_examples_is_named(made):
     stack = made / "fields.nc"
-    with pytest.raises(RaptorError, match=r"no validation example; raise design.simulations"):
+    with pytest.raises(RaptorError, match=r"no validation example; raise the campaign's runs"):
         split_examples(
             [stack], list_examples(stack, ["train"]), read_table(stack).split, moulds_of(made), SCALING, 32
         )

@@ -309,4 +309,6 @@ def test_a_command_says_what_one_would_do_next_on_standard_error(tmp_path):
         f"next: raptor simulate {DOG_BONE / 'dog_bone.svg'} --scale 0.8 --tissue glial_1 --output tissue.nc"
     )
     assert "next" not in done.stdout
+    done = raptor("draw", DOG_BONE / "dog_bone.svg", "--layers", 2)
+    assert " --layers 2 --tissue" in done.stderr.splitlines()[-1]
     assert "next" not in raptor("draw", DOG_BONE / "dog_bone.svg", "--json").stderr

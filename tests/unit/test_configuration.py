@@ -152,6 +152,8 @@ def test_a_model_is_as_the_first_but_for_its_keys():
         ({"one": {}, "on": {"initial_weights": "one", "ensemble_size": 3}}, "on.ensemble_size is 3"),
         ({"one": {"campaigns": ["sweep"]}}, "sweep has no run to train on"),
         ({"one": {"campaigns": ["papers"]}}, "campaigns has 'papers'; allowed are paper"),
+        ({"one": {"noise": 8}, "on": {"initial_weights": "one", "noise": 16}}, "its initial_weights has 8"),
+        ({"one": {}, "nearest": {}}, "nearest and mean are baselines; choose another name"),
         ({"one": {"lambda_l1": 100.0}, "on": {"initial_weights": "one"}}, "set lambda_l1: null"),
     ],
 )

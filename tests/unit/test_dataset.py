@@ -49,6 +49,12 @@ def test_other_shards_give_the_same_data(made, tmp_path):
     assert differences(made, build(tmp_path / "unit", 2)) == []
 
 
+def test_a_variable_of_one_data_set_alone_is_a_difference(made, folder):
+    with netCDF4.Dataset(folder / "fields.nc", "a") as file:
+        file.createVariable("added", "f8", ())
+    assert differences(made, folder) == differences(folder, made) == ["fields.nc: added differs"]
+
+
 def edit(path, name, change):
     with netCDF4.Dataset(path, "a") as file:
         file.set_auto_mask(False)

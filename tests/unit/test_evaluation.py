@@ -1,9 +1,11 @@
 """Bands hold their share, flags fire, and the noise floor is what it says."""
 
 import re
+import shutil
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import netCDF4
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,11 +24,13 @@ from raptor.dataset.examples import (
     transform_sample,
 )
 from raptor.dataset.stack import read_samples, read_table
+from raptor.fields.directors import anisotropy
+from raptor.fields.resample import block_average
 from raptor.fields.shape import shape_ratios
 from raptor.frame import pixel_centres, pixel_size
 from raptor.moulds import Mould, moulds_by_id
 from raptor.moulds.cast import CastMould
-from raptor.raster import density_threshold
+from raptor.raster import density_threshold, rasterise
 from raptor.studies.active_learning import disagreement_of
 from raptor.studies.evaluation import by_region, evaluate, in_floors, noise_floor, predictor_of, summarise
 from raptor.studies.scores import summary_of
@@ -35,6 +39,7 @@ from raptor.surrogate.baselines import Nearest, baseline, training_mean
 from raptor.surrogate.batches import ExampleSet
 from raptor.surrogate.calibration import Case, calibrate, fit_threshold
 from raptor.surrogate.costs import costs_of
+from raptor.surrogate.ensemble import Realisations
 from raptor.surrogate.files import load, save
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
@@ -153,6 +158,18 @@ def test_the_threshold_of_softer_images_is_found():
     assert fit_threshold(same, 0.3) == pytest.approx(1, abs=5e-3)
 
 
+def test_local_alignment_does_not_depend_on_the_networks_raster():
+    """Cells that point anywhere: block averages of 64 pixels mix their directions."""
+    cast = CastMould(Mould(shapely.box(-20, -10, 20, 10)), 3, 256)
+    turned = np.random.default_rng(5).uniform(0, np.pi, cast.n_cells)
+    orientation = np.stack([np.cos(turned), np.sin(turned), np.zeros(cast.n_cells)], axis=1)
+    fields = rasterise(cast.sites, orientation, np.zeros(cast.n_cells), 256).astype(np.float32)
+    wanted, coarse = anisotropy(fields), block_average(fields, 64)
+    assert anisotropy(coarse) < 0.95 * wanted
+    ((_, found),) = Realisations.of(cast, coarse[None], sampled=False).directions
+    assert found == pytest.approx(wanted, rel=0.02)
+
+
 def test_an_ensemble_predicts_fields_with_bands_and_keeps_them_in_files(surrogate, moulds, stack, tmp_path):
     (sample,) = read_samples(stack, read_table(stack).rows("test")[:1])
     mould = moulds[sample.mould]
@@ -232,6 +249,23 @@ def test_the_noise_floor_is_the_error_of_the_mean_of_many_runs(made, stack, moul
     assert 0.7 < in_floors(other, floor)["density"] / np.sqrt(2) < 1.4
     perfect = evaluate(lambda sample, mould: sample.fields, stack, moulds)
     assert in_floors(perfect, floor)["density"] == 0
+
+
+def test_a_floor_is_of_runs_of_the_same_tissue(made, stack, moulds, tmp_path):
+    """A repeat whose own run failed, or had other parameters, has none."""
+    base = read_design(made / "design.csv"), moulds
+    given = design("again", repeat_of="paper", runs=2, seeds=1, **DRAWN)
+    repeats = build(tmp_path / "again", 4, given, base)
+    changed = tmp_path / "changed.nc"
+    shutil.copy(repeats / "fields.nc", changed)
+    with netCDF4.Dataset(changed, "a") as file:
+        file["delta"][0] = 0.123
+    floor = noise_floor(stack, changed, moulds)
+    assert floor["mould"].tolist() == [read_table(changed).mould[1]]
+    with netCDF4.Dataset(changed, "a") as file:
+        file["delta"][:] = 0.123
+    with pytest.raises(RaptorError, match="repeats no run of"):
+        noise_floor(stack, changed, moulds)
 
 
 def test_baselines(stack):

@@ -12,6 +12,7 @@ from raptor.dataset.scaling import INPUTS
 from raptor.fields.resample import block_average, deconvolve
 from raptor.surrogate.generator import Generator
 from raptor.surrogate.inference import Surrogate
+from raptor.surrogate.networks.blocks import IMAGES
 from raptor.surrogate.onnx_export import export_networks
 from raptor.surrogate.rules import Architecture
 
@@ -39,7 +40,7 @@ def images(architecture, count=3):
     """Inputs like those of moulds, and numbers of cells."""
     torch.manual_seed(7)
     inputs = torch.rand(count, len(INPUTS), architecture.pixels, architecture.pixels) * 2 - 1
-    inputs[:, 2:] = inputs[:, 2:, :1, :1]
+    inputs[:, IMAGES:] = inputs[:, IMAGES:, :1, :1]
     return inputs, torch.full((count,), 500.0)
 
 

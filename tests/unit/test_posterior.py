@@ -42,7 +42,7 @@ def surveyed(points=128, sigma=0.01):
     values = np.full((points, len(SEEN)), np.nan)
     values[:, :2] = smooth(parameters)
     values[:, 2:] = as_array(parameters)[:, [0, 1, 2, 1, 2, 1]]
-    return Survey(units, values, np.full((16, 2), sigma))
+    return Survey(units, values, np.full((points, 2), sigma))
 
 
 def test_the_unit_cube_is_the_papers_region():

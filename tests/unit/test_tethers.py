@@ -87,6 +87,14 @@ def test_an_image_shows_the_tethers_that_have_room_for_a_row_of_cells(gap, encir
         assert np.isfinite(shares[0]) == encircled
 
 
+def test_a_post_between_pixel_centres_can_be_lost():
+    """At 32 pixels of 2 l0 no centre lies in it; the nearest one decides."""
+    cast = CastMould(Mould(shapely.box(-20, -12, 20, 12), (Circle(0.0, 0.0, 0.5),)), 3, 32)
+    assert (cast.tether_depths[0] < 0).all()
+    assert seen_held(cast.density, cast).tolist() == [1.0]
+    assert seen_held(np.zeros_like(cast.density), cast).tolist() == [0.0]
+
+
 def test_what_a_simulated_tissue_holds():
     made = simulate(MOULD, CellParameters(0.4, 0.5, 0.3), 2, "draft")
     assert made.held.tolist() == [1, 1]

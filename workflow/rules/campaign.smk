@@ -202,7 +202,7 @@ rule write_card:
 
 
 rule tabulate_campaign:
-    """Tabulate area and width of every simulation of a campaign."""
+    """Tabulate the measures of every simulation of a campaign."""
     input:
         stack=rules.build_stack.output.stack,
     output:
@@ -242,7 +242,7 @@ rule check_splits:
 for campaign in CAMPAIGNS:
 
     rule:
-        """One campaign, checked, with its table of areas and widths; NAME is that of the campaign."""
+        """One campaign, checked, with its table of measures; NAME is that of the campaign."""
         name:
             f"campaign_{campaign}"
         input:

@@ -12,7 +12,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.jobs import hold_lock
 from raptor.core.version import MODEL_VERSION
 from raptor.moulds.reading import find_mould
-from raptor.surrogate.baselines import BASELINES
+from raptor.surrogate.rules import BASELINES
 
 if "name" not in config:
     raise WorkflowError(

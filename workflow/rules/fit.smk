@@ -1,6 +1,5 @@
 """Fits of measured tissues."""
 
-# Settings of the simulations made by fits.
 FITTED = list(TISSUES)
 JOINT = CONFIG.fit.joint if CONFIG.has_surrogate else ()
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
-from raptor.moulds import read_mould
+from raptor.moulds.reading import read_at_scale
 from raptor.studies.tradeoff import REFERENCES, Trial, compare
 
 with logged(snakemake.log[0]):
@@ -16,8 +16,8 @@ with logged(snakemake.log[0]):
 
         torch.set_num_threads(snakemake.threads)
         surrogate = load(Path(snakemake.input.surrogate[0]).parent)
-    trial = Trial.of(snakemake.params.trial, read_mould(Path(snakemake.input.mould)))
-    methods = snakemake.params.methods
+    about, methods = snakemake.params.trial, snakemake.params.methods
+    trial = Trial.of(about, read_at_scale(snakemake.input.mould, about["mould_scale"]))
     with progress(trial.name, REFERENCES + len(methods)) as advance:
         table = compare(trial, methods, surrogate, advance)
     with atomic_path(Path(snakemake.output.table)) as path:

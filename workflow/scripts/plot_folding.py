@@ -8,12 +8,13 @@ from raptor.condor.energy import inverted_share
 from raptor.condor.lattice import build_lattice
 from raptor.core.files import atomic_path
 from raptor.core.jobs import logged, progress
-from raptor.moulds import read_mould
+from raptor.moulds.reading import read_at_scale
 from raptor.plotting import folding_figure, save
 from raptor.studies.tradeoff import Trial
 
 with logged(snakemake.log[0]):
-    trial = Trial.of(snakemake.params.trial, read_mould(Path(snakemake.input.mould[0])))
+    about = snakemake.params.trial
+    trial = Trial.of(about, read_at_scale(snakemake.input.mould[0], about["mould_scale"]))
     lattice = build_lattice(trial.mould, trial.parameters, trial.model)
     methods = ("reference", snakemake.params.method)
     with progress("folding", len(methods)) as advance:

@@ -15,9 +15,7 @@ with logged(snakemake.log[0]):
     runs = [run for run in read_design(Path(snakemake.input.design)) if first <= run.simulation <= last]
     moulds = moulds_by_id(Path(snakemake.input.moulds), {run.mould for run in runs})
     params = snakemake.params
-    model = NetworkModel(
-        params.simulator["layers"], tuple(params.simulator["shells"]), params.simulator["tension"]
-    )
+    model = NetworkModel.configured(params.simulator)
     accuracy = params.simulator["accuracy"]
     device = chosen_device("auto", snakemake.resources.get("gpu", 0))
     with progress(f"{snakemake.wildcards.campaign} {snakemake.wildcards.shard}", len(runs)) as advance:

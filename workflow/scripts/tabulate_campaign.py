@@ -1,4 +1,4 @@
-"""Tabulate area and width of every simulation of a campaign."""
+"""Tabulate the measures of every simulation of a campaign."""
 
 from pathlib import Path
 

@@ -8,6 +8,7 @@ import typer
 
 import raptor
 from raptor.cli import options as opt
+from raptor.parameters import LAYERS
 
 
 def draw(
@@ -16,7 +17,7 @@ def draw(
     scale: opt.Scale = None,
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
-    layers: opt.Layers = 7,
+    layers: opt.Layers = LAYERS,
     like: Annotated[Path | None, typer.Option(help="another mould to compare with, drawn dashed")] = None,
     geojson: Annotated[Path | None, typer.Option(help="GeoJSON file to write the mould to")] = None,
     as_json: opt.Json = False,
@@ -55,5 +56,6 @@ def draw(
     if geojson is not None:
         write_moulds(geojson, [shape])
     sentence = f"{mould}: " + ", ".join(f"{name} {value}" for name, value in rows.items())
-    then = f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} --tissue glial_1 --output tissue.nc"
+    words = opt.words(mould, scale, mm_per_l0, page, layers)
+    then = f"raptor simulate {words} --tissue glial_1 --output tissue.nc"
     opt.report(sentence, numbers | {"picture": output, "geojson": geojson}, as_json, then)

@@ -108,7 +108,7 @@ def fit(
     opt.save_picture(found, picture, photograph=photograph)
     sentence, numbers = _told(found, photograph)
     numbers |= {"mm_per_l0": shape.mm_per_l0, "output": output, "picture": picture}
-    words = opt.words(mould, scale, mm_per_l0, page)
+    words = opt.words(mould, scale, mm_per_l0, page, found.layers)
     opt.report(f"{output}: {sentence}", numbers, as_json, _then(found, words))
 
 

@@ -5,14 +5,15 @@ import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import raptor
+from raptor.core.files import plain
 from raptor.core.jobs import progress
+from raptor.parameters import LAYERS
 
 if TYPE_CHECKING:
     from raptor.dataset.result import Result
@@ -175,7 +176,7 @@ def report(sentence: str, numbers: Mapping[str, Any], as_json: bool, then: str =
         if then:
             typer.echo(f"next: {then}", err=True)
         return
-    typer.echo(json.dumps({name: _plain(value) for name, value in numbers.items()}, indent=1))
+    typer.echo(json.dumps(plain(numbers), indent=1))
 
 
 def quote(path: object) -> str:
@@ -183,18 +184,11 @@ def quote(path: object) -> str:
     return shlex.quote(str(path))
 
 
-def words(mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None) -> str:
-    """A mould as it was given on the command line, for the next command."""
+def words(
+    mould: Path, scale: float | None, mm_per_l0: float | None, page: int | None, layers: int = LAYERS
+) -> str:
+    """A mould as it was given on the command line, and layers if not the usual, for the next command."""
     given = {"--scale": scale, "--mm-per-l0": mm_per_l0, "--page": page}
+    given |= {"--layers": layers if layers != LAYERS else None}
     flags = (f"{flag} {value:g}" for flag, value in given.items() if value is not None)
     return " ".join([quote(mould), *flags])
-
-
-def _plain(value: Any) -> Any:
-    """A value in the types of JSON."""
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    value = value.item() if hasattr(value, "item") else value  # numpy's numbers
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value

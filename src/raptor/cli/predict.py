@@ -52,9 +52,6 @@ def predict(
             surrogate.require_samples()
         found = replace(raptor.predict(shape, cells, surrogate), kept=samples)
     point = f"--delta {cells.delta:g} --kappa-nnn {cells.kappa_nnn:g} --kappa-nnnn {cells.kappa_nnnn:g}"
-    then = (
-        f"raptor simulate {opt.words(mould, scale, mm_per_l0, page)} {point} --output simulated.nc"
-        if found.unusual
-        else ""
-    )
+    words = opt.words(mould, scale, mm_per_l0, page, found.layers)
+    then = f"raptor simulate {words} {point} --output simulated.nc" if found.unusual else ""
     opt.finish(found, output, picture, fields, as_json, then)

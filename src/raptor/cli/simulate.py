@@ -7,6 +7,7 @@ import typer
 import raptor
 from raptor.cli import options as opt
 from raptor.core.jobs import progress
+from raptor.parameters import LAYERS
 
 
 def simulate(
@@ -20,7 +21,7 @@ def simulate(
     scale: opt.Scale = None,
     mm_per_l0: opt.MmPerL0 = None,
     page: opt.Page = None,
-    layers: opt.Layers = 7,
+    layers: opt.Layers = LAYERS,
     accuracy: Annotated[str, typer.Option(help="draft, standard, reference or anneal-SWEEPS")] = "standard",
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="seed of every random number")] = 0,
     picture: opt.Picture = None,

@@ -26,7 +26,7 @@ from raptor.fields.tethers import contact, held, posts_lost
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
-from raptor.parameters import CellParameters, NetworkModel, require_parameters
+from raptor.parameters import LAYERS, CellParameters, NetworkModel, require_parameters
 from raptor.raster import density_image, rasterise
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ class Tissue:
 def simulate(
     mould: Mould | str | Path,
     cells: CellParameters,
-    layers: int | NetworkModel = 7,
+    layers: int | NetworkModel = LAYERS,
     accuracy: str | Accuracy = "standard",
     seed: int = 0,
 ) -> Tissue:

@@ -13,9 +13,9 @@ from raptor.dataset.campaign import Campaign, Design, Grid
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds.families import MouldFamilies
 from raptor.moulds.random_moulds import MARGIN, RandomMoulds
-from raptor.parameters import NetworkModel
+from raptor.parameters import LAYERS, NetworkModel
 from raptor.studies.tradeoff import SURROGATE, Tradeoff
-from raptor.surrogate.rules import SHIPPED
+from raptor.surrogate.rules import BASELINES, SHIPPED
 
 CAMPAIGNS = {
     "paper": Campaign(runs=64, test=12, validation=8, edge=8),
@@ -40,7 +40,7 @@ class Configuration(Block):
 
     name: Name = Field("laptop", description="folder of the results, under results/")
     seed: int = Field(20250206, ge=0, lt=2**63, description="root of every random stream")
-    layers: int = Field(7, ge=1, le=64, description="cell layers between floor and fill height")
+    layers: int = Field(LAYERS, ge=1, le=64, description="cell layers between floor and fill height")
     shells: tuple[int, int, int] = Field(
         (1, 2, 3), description="neighbour shells of kappa0, kappa_nnn and kappa_nnnn"
     )
@@ -149,6 +149,8 @@ class Configuration(Block):
 
     def _check_model(self, name: str, model: Model) -> None:
         """Check that a model's campaigns have the splits it needs, and that initial weights fit it."""
+        if name in BASELINES:
+            raise ValueError(f"models.{name}: {' and '.join(BASELINES)} are baselines; choose another name")
         for campaign in model.campaigns:
             block = self.campaigns.get(campaign)
             if block is None:
@@ -156,7 +158,12 @@ class Configuration(Block):
                     f"models.{name}.campaigns has '{campaign}'; allowed are {', '.join(self.campaigns)} "
                     "(or state models: {} to simulate only)"
                 )
-            if block.kind is None or block.tests + block.validation >= block.runs:
+            if block.kind is None:
+                raise ValueError(
+                    f"models.{name}.campaigns: {campaign} has no run to train on, since its moulds are "
+                    "given; name a campaign of random moulds"
+                )
+            if block.tests + block.validation >= block.runs:
                 raise ValueError(
                     f"models.{name}.campaigns: {campaign} has no run to train on; lower its test or "
                     "validation"
@@ -177,6 +184,10 @@ class Configuration(Block):
         for key in ("network", "base_channels", "pixels"):
             if getattr(model, key) != getattr(initial, key):
                 raise ValueError(f"models.{name}.{key} differs from that of its initial_weights")
+        if initial.noise not in (0, model.noise):
+            raise ValueError(
+                f"models.{name}.noise is {model.noise}; its initial_weights has {initial.noise}, so set that"
+            )
         if model.ensemble_size > initial.ensemble_size:
             raise ValueError(
                 f"models.{name}.ensemble_size is {model.ensemble_size}; its initial_weights has "
@@ -309,7 +320,8 @@ class Configuration(Block):
     def trial(self, case: str) -> dict[str, Any]:
         """All that the comparison on a case depends on, apart from the methods and the mould's file."""
         chosen = self.tradeoff.cases[case].model_dump(mode="json")
-        simulator = self.model_dump(mode="json", include={"layers", "shells", "tension", "pixels", "seed"})
+        kept = {"layers", "shells", "tension", "pixels", "seed", "mould_scale"}
+        simulator = self.model_dump(mode="json", include=kept)
         alike = chosen["layers"] in (None, self.layers)
         chosen["layers"] = chosen["layers"] or self.layers
         return simulator | chosen | {"name": case, "surrogate": alike and self.compares_surrogate}

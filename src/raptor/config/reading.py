@@ -13,7 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.core.files import read_json
 from raptor.moulds.cast import cast_sites, central_section
 from raptor.moulds.library.tissues import MeasuredTissue, load_tissues
-from raptor.moulds.reading import read_at_scale, read_mould
+from raptor.moulds.reading import read_at_scale
 from raptor.optimisation.spec import others, read_spec
 
 
@@ -114,7 +114,7 @@ def require_castable(configuration: Configuration) -> None:
         except RaptorError as error:
             raise RaptorError(f"campaigns.{name}: {error}") from error
     for case in configuration.tradeoff.cases.values():
-        cast_sites(read_mould(case.mould), 1)
+        cast_sites(read_at_scale(case.mould, configuration.mould_scale), 1)
 
 
 def require_usable(configuration: Configuration) -> None:

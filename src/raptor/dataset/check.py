@@ -37,7 +37,7 @@ from raptor.raster import DEEP
 from raptor.symmetry import FIELDS
 
 RELATIVE = 1e-4  # of recomputed values: storage is float32
-UNDEFINED = ("area_ratio", "width_ratio", "held", "alignment")  # if there is nothing to measure
+UNDEFINED = ("area_ratio", "width_ratio", "held", "alignment", "anisotropy")  # if there is nothing to measure
 WALL_YIELD = 0.1  # l0; depth to which a soft wall yields
 
 

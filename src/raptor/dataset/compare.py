@@ -1,6 +1,7 @@
 """Whether two data sets are the same data (docs/data.md, rule 6)."""
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +40,18 @@ def _campaign_differences(first: Path, second: Path) -> list[str]:
     if one.keys() != two.keys():
         found.append(f"simulations {sorted(one.keys() ^ two.keys())} are in only one of the folders")
     for simulation in sorted(one.keys() & two.keys()):
-        names = [n for n in one[simulation] if not _equal(one[simulation][n], two[simulation].get(n))]
+        names = _different(one[simulation], two[simulation])
         if names:
             found.append(f"simulation {simulation}: {', '.join(names)} differ")
     with open_file(first / "fields.nc") as a, open_file(second / "fields.nc") as b:
-        found += [f"fields.nc: {n} differs" for n in a.variables if not _equal(a[n][:], b[n][:])]
+        found += [f"fields.nc: {name} differs" for name in _different(a.variables, b.variables)]
     return found
+
+
+def _different(one: Mapping[str, Any], two: Mapping[str, Any]) -> list[str]:
+    """Names of the variables that differ, or that only one has."""
+    names = dict.fromkeys([*one, *two])
+    return [n for n in names if n not in one or n not in two or not _equal(one[n][...], two[n][...])]
 
 
 def _simulations(folder: Path) -> dict[int, dict[str, Any]]:
@@ -61,7 +68,7 @@ def _simulations(folder: Path) -> dict[int, dict[str, Any]]:
                     name: slice(ends[name][row] - counts[name][row], ends[name][row]) for name in counts
                 }
                 found[int(file["simulation"][row])] = {
-                    name: variable[parts.get(variable.dimensions[0], row)]
+                    name: np.asarray(variable[parts.get(variable.dimensions[0], row)])
                     for name, variable in file.variables.items()
                     if name != "wall_time"
                 }

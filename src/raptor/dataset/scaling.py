@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from raptor.core.errors import RaptorError
 from raptor.core.files import read_json, write_json
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.parameters import BOUNDS, CellParameters
 from raptor.symmetry import FIELDS
 
 SHARED = (("sxsx", "sysy"), ("sxsz", "sysz"))
 SIGNED = ("tension", "sxsy", "sxsz", "sysz")
-SCALED = {"delta": DELTA, "kappa_nnn": KAPPA_NNN, "kappa_nnnn": KAPPA_NNNN}
-INPUTS = ("depression", "tethers", "as_cast", *SCALED)
+INPUTS = ("depression", "tethers", "as_cast", *BOUNDS)
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def scale_inputs(images: NDArray[np.floating], parameters: CellParameters) -> ND
 
 def scaled_parameters(parameters: CellParameters) -> NDArray[np.float64]:
     """Delta, kappa_nnn and kappa_nnnn (3,), -1 to 1 over their ranges."""
-    return np.array([(getattr(parameters, name) - each.middle) / each.half for name, each in SCALED.items()])
+    return np.array([(getattr(parameters, name) - each.middle) / each.half for name, each in BOUNDS.items()])
 
 
 def write_scaling(path: Path, scaling: Scaling, campaigns: Sequence[str], fraction: float = 1.0) -> None:

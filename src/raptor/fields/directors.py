@@ -79,9 +79,9 @@ def anisotropy(fields: NDArray[np.floating]) -> float:
 
     The sum over pixels of sqrt((SxSx - SySy)^2 + 4 SxSy^2) over that of SxSx + SySy.
     """
-    named = dict(zip(FIELDS, fields.astype(np.float64), strict=True))
+    named = dict(zip(FIELDS, fields, strict=True))
     sizes = np.hypot(named["sxsx"] - named["sysy"], 2 * named["sxsy"])
-    return _share(sizes.sum(), (named["sxsx"] + named["sysy"]).sum())
+    return _share(sizes.sum(dtype=np.float64), (named["sxsx"] + named["sysy"]).sum(dtype=np.float64))
 
 
 def _alignment(sxsx: float, sysy: float, sxsy: float, angle: float) -> float:

@@ -92,6 +92,8 @@ def labelled(
 def labelled_masks(mould: "Mould | CastMould", pixels: int = 256) -> "xr.Dataset":
     """Masks (y, x) of depression and tethers of a mould, with pixel centres and the mould.
 
+    A mould that is cast has its own number of pixels.
+
     Raises
     ------
     RaptorError

@@ -72,7 +72,7 @@ def filled(
     above, free = density - threshold, outside(density, ENCLOSING * threshold)
     gap = np.where(outside(density, threshold), CLEARANCE, GAP)
     for window, depth in _thin_tethers(cast):
-        if not free[window][depth >= 0].any():
+        if not free[window][pixels_in(depth)].any():
             above[window] = np.maximum(above[window], threshold * (depth + gap[window]))
     return above
 
@@ -82,6 +82,11 @@ def _thin_tethers(cast: CastMould) -> list[tuple[Window, NDArray[np.float64]]]:
     """Where each thin tether can fill tissue, and its depth there, l0."""
     windows = [_around(depth > -1 - GAP) for depth in cast.thin_tethers]
     return [(window, depth[window]) for window, depth in zip(windows, cast.thin_tethers, strict=True)]
+
+
+def pixels_in(depth: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Pixels (y, x) with their centre in a tether, given their depth in it; else the one nearest to it."""
+    return depth >= min(0.0, float(depth.max()))
 
 
 def outside(density: NDArray[np.floating], level: float) -> NDArray[np.bool_]:

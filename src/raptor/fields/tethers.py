@@ -5,7 +5,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from raptor.fields.shape import outside
+from raptor.fields.shape import outside, pixels_in
 from raptor.moulds.cast import CastMould, once_per_cast
 from raptor.moulds.loops import centre_of, winding
 
@@ -66,16 +66,17 @@ def seen_held(
     The counterpart of `held` for images. NaN if the tissue as cast does not enclose the tether.
     """
     free = outside(density, OPEN * (cast.threshold if threshold is None else threshold))
-    inside = [depth >= 0 for depth in cast.tether_depths]
-    enclosed = zip(inside, _enclosed_as_cast(cast), strict=True)
-    return np.array([float(not free[mask].any()) if before else np.nan for mask, before in enclosed])
+    enclosed = zip(cast.tether_depths, _enclosed_as_cast(cast), strict=True)
+    return np.array(
+        [float(not free[pixels_in(depth)].any()) if before else np.nan for depth, before in enclosed]
+    )
 
 
 @once_per_cast
 def _enclosed_as_cast(cast: CastMould) -> list[bool]:
     """Whether the tissue as cast encloses each tether."""
     free = outside(cast.density, CLOSED * cast.threshold)
-    return [not free[depth >= 0].any() for depth in cast.tether_depths]
+    return [not free[pixels_in(depth)].any() for depth in cast.tether_depths]
 
 
 def _rim(polygon: shapely.Polygon) -> NDArray[np.float64]:

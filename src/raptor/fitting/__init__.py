@@ -2,7 +2,7 @@
 
 from raptor.fitting.experimental_design import Sampled, rank_measurements, simulate_draws
 from raptor.fitting.joint import fit_joint
-from raptor.fitting.least_squares import Fit, Minimum, descend, fit, minimise
+from raptor.fitting.least_squares import Fit, Minimum, descend, minimise
 from raptor.fitting.measurements import CANDIDATES, seen
 from raptor.fitting.outline import Outline, deviations, distances, outline_measure, outline_of, read_outline
 from raptor.fitting.posterior import Posterior, Survey, infer, profile, summarise, survey
@@ -36,7 +36,6 @@ __all__ = [
     "descend_by_simulation",
     "deviations",
     "distances",
-    "fit",
     "fit_joint",
     "fit_tissue",
     "infer",

@@ -13,7 +13,7 @@ from raptor.core.errors import RaptorError
 from raptor.fitting.fitted import FittedTissue
 from raptor.fitting.least_squares import STEP as SMALL_STEP
 from raptor.fitting.least_squares import Minimum, descend, minimise
-from raptor.fitting.outline import Outline, deviations, read_outline
+from raptor.fitting.outline import OUTLINE_ERROR, Outline, deviations, drawn_outline, read_outline
 from raptor.fitting.posterior import RATIO_ERROR, Posterior, infer, summarise, survey
 from raptor.fitting.request import By, Request
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
@@ -21,17 +21,16 @@ from raptor.fitting.space_mapping import TOLERANCE, correct
 from raptor.fitting.targets import PARAMETERS, Measure, Target, as_array, unit_of
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
-from raptor.parameters import CellParameters, NetworkModel, require_parameters
+from raptor.parameters import LAYERS, CellParameters, NetworkModel, require_parameters
+from raptor.surrogate.bands import NORMAL
 from raptor.surrogate.command import load_surrogate
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.prediction import Prediction
 
-OUTLINE_ERROR = 0.25
 LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
 CORRECTED = 4  # of a fit by the simulator, one in so many simulations may correct the surrogate's fit
 SIMULATIONS: dict[str, int] = {"surrogate": 0, "corrected": 3, "simulator": 40}
 DRAWS = 200  # from the posterior, to draw
-NORMAL = 1.96  # standard deviations to an end of a 95 % interval
 
 
 def fit(
@@ -91,7 +90,9 @@ def fit(
     start = _start(start, by)
     target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
     used = _surrogate(surrogate, layers) if start is None else None
-    model = NetworkModel(used.layers if used is not None else layers or 7)
+    model = NetworkModel(used.layers if used is not None else LAYERS if layers is None else layers)
+    if error is not None and not 0 < error < np.inf:
+        raise RaptorError(f"error is {error}; give a positive number, the standard error of the measurement")
     simulator = Simulator(model, accuracy, used.pixels if used is not None else PIXELS, seed)
     budget = _budget(simulations, by)
     return _fit(Request(mould, target, simulator, used, start, by, budget, error, on_progress))
@@ -125,11 +126,7 @@ def _surrogate(surrogate: Surrogate | str | Path | None, layers: int | None) -> 
             f"layers is {layers}, but this surrogate is for {loaded.layers}; omit it, or start the "
             "simulator from your own parameters"
         )
-    if loaded.calibration is None:
-        raise RaptorError(
-            "this model's errors were not calibrated, so a fit by it cannot say what it leaves open; use a "
-            "model written by the workflow's rule assemble_model"
-        )
+    loaded.require_calibration()
     return loaded
 
 
@@ -153,7 +150,7 @@ def _target(
     if outline is None:
         return Target(area_ratio, width_ratio)
     if isinstance(outline, shapely.Geometry):
-        return Outline.along(outline)
+        return drawn_outline(outline)
     return outline if isinstance(outline, Outline) else read_outline(Path(outline))
 
 

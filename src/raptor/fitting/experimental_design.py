@@ -34,8 +34,7 @@ class Sampled:
     units : ndarray (n, 3)
         Positions in the unit cube.
     table : DataFrame
-        Parameters; each of `SEEN`, simulated and predicted (`{name}_predicted`); `thickness`.
-
+        Parameters; each of `SEEN`, simulated and predicted (`{name}_predicted`); `thickness`; `converged`.
     """
 
     units: NDArray[np.float64]

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from raptor.condor.simulate import Tissue
 from raptor.fitting.least_squares import Minimum
 from raptor.fitting.outline import Outline, distances
-from raptor.fitting.posterior import BOUNDS
 from raptor.fitting.tables import write_fit
 from raptor.fitting.targets import PARAMETERS, RATIOS, Target
 from raptor.moulds.geometry import Mould
-from raptor.parameters import CellParameters
+from raptor.parameters import BOUNDS, CellParameters
+from raptor.surrogate.bands import NORMAL
 from raptor.surrogate.prediction import Prediction
 
 
@@ -76,14 +76,14 @@ class FittedTissue:
     def open(self) -> list[str]:
         """Parameters that the measurement leaves open: more than half of what was unknown before is left.
 
-        Compared are the interval, taken for 3.92 standard deviations, and the deviation of a uniform
+        Compared are the interval, taken for that of a normal error, and the deviation of a uniform
         distribution over the parameter's range. All of them where there are no intervals.
         """
         return [
             name
             for name in PARAMETERS
             if name not in self.intervals
-            or np.ptp(self.intervals[name]) / 3.92 > 0.5 * (BOUNDS[name].upper - BOUNDS[name].lower) / 12**0.5
+            or np.ptp(self.intervals[name]) / (2 * NORMAL) > BOUNDS[name].half / 12**0.5
         ]
 
     def apart(self, tissue: shapely.Geometry) -> float:

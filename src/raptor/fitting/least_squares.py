@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from raptor.core.errors import RaptorError
-from raptor.fitting.targets import Measure, Target, parameters_at
+from raptor.fitting.targets import Measure, parameters_at
 from raptor.parameters import CellParameters
 
 STEP = 0.02  # of a finite difference, over a bound's width
@@ -204,16 +204,12 @@ def descend(
     memory = _Memory(measure, residuals, max(budget, 1), enough)
     start = np.clip(start, *WITHIN)
     if not np.isfinite(_cost(memory.residuals_at(start[None])[0])):
-        raise RaptorError("none of the measured ratios can be computed at the start of the search")
+        raise RaptorError(
+            "none of the measured ratios can be computed at the start of the search; start from a smaller "
+            "delta, or give the area ratio alone"
+        )
     _descend(memory, start, step, tolerance)
     return memory.best()
-
-
-def fit(
-    measure: Measure, target: Target, *, seed: int, starts: int = STARTS, fine: Measure | None = None
-) -> Fit:
-    """Fit the parameters to one tissue, as `minimise`."""
-    return Fit.at(minimise(measure, target.residuals, starts=starts, seed=seed, fine=fine))
 
 
 def _descend(memory: _Memory, start: NDArray[np.float64], step: float, tolerance: float) -> None:

@@ -27,6 +27,7 @@ from raptor.moulds.bitmap import MOST_PIXELS
 from raptor.parameters import CellParameters
 
 POINTS = 128  # along the measured outline
+OUTLINE_ERROR = 0.25  # l0; of an outline drawn on a photograph: a pixel of the paper's image
 SPECK = 0.01  # of the tissue's area; smaller pieces of an image are ignored
 APART = 4.0  # l0; correlation length of errors along an outline
 STEP = 0.02  # of finite differences
@@ -99,10 +100,21 @@ def _drawn(path: Path) -> Outline:
         tissue = shapely.from_geojson(json.dumps(content.get("geometry", content)))
     except (shapely.GEOSException, AttributeError, TypeError) as error:
         raise RaptorError(f"outline {path} is not GeoJSON of one tissue: {error}") from error
+    return drawn_outline(tissue, f"outline {path}")
+
+
+def drawn_outline(tissue: shapely.Geometry | None, what: str = "the outline") -> Outline:
+    """The outline of a tissue drawn as a polygon or several, l0.
+
+    Raises
+    ------
+    RaptorError
+        If it is none, or leaves the frame.
+    """
     if tissue is None or tissue.geom_type not in ("Polygon", "MultiPolygon") or tissue.is_empty:
-        raise RaptorError(f"outline {path} holds no polygon; give what raptor measure --outline writes")
+        raise RaptorError(f"{what} holds no polygon; give what raptor measure --outline writes")
     if np.abs(tissue.bounds).max() > IMAGE_SIZE / 2:
-        raise RaptorError(f"outline {path} leaves the frame of {IMAGE_SIZE} l0; its lengths must be in l0")
+        raise RaptorError(f"{what} leaves the frame of {IMAGE_SIZE} l0; its lengths must be in l0")
     return Outline.along(tissue)
 
 
@@ -189,7 +201,7 @@ def tissue_above(excess: NDArray[np.floating], what: str) -> shapely.Geometry:
     lines = [shapely.LineString(line[:, ::-1] * size + origin) for line in find_contours(padded, 0.0)]
     found = shapely.get_parts(shapely.build_area(shapely.MultiLineString(lines)))
     if len(found) == 0:
-        raise RaptorError(f"{what} shows no tissue")
+        raise RaptorError(f"{what} shows no tissue; give one with tissue that differs from its border")
     areas = shapely.area(found)
     kept: shapely.Geometry = shapely.MultiPolygon(list(found[areas > SPECK * areas.sum()]))
     return kept

@@ -14,7 +14,7 @@ i the interpolation error. The prior is the paper's distribution: delta uniform,
 their bounded plane.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,29 +23,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RBFInterpolator
 from scipy.linalg import eigh
-from scipy.stats import chi2, norm, qmc
+from scipy.stats import chi2, qmc
 
 from raptor.core.errors import RaptorError
 from raptor.core.jobs import in_threads
 from raptor.fitting.measurements import SEEN, seen
 from raptor.fitting.targets import PARAMETERS, Target, parameters_at, prior_density, values_at
 from raptor.moulds.geometry import Mould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
-from raptor.surrogate.bands import LEVELS
+from raptor.parameters import BOUNDS
+from raptor.surrogate.bands import LEVELS, NORMAL
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-POINTS = 64  # Sobol points at which the surrogate is evaluated; interpolation errs by less than 0.003
+POINTS = 32  # Sobol points at which the surrogate is evaluated; interpolation errs by less than 0.003
 RATIO_ERROR = 0.01  # standard error of a measured area or width ratio
 DENSE = 2**16  # points of the posterior
-BANDED = 32  # points of a survey at which bands are computed
-TOGETHER = 16  # predictions per batch
 QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 BINS = 40  # of a profile
 BEST = 0.1  # chi2 above its minimum: a third of a standard deviation
 UNLIKELY = 0.01  # probability of a larger chi2 below which the measurement is out of reach
-BOUNDS = dict(zip(PARAMETERS, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True))
 
 
 @dataclass(frozen=True)
@@ -58,8 +55,8 @@ class Survey:
         Points of the unit cube (`targets.parameters_at`).
     values : ndarray (n, k)
         Measured quantities there, in the order `names`; area and width ratio first.
-    sigma : ndarray (b, 2)
-        Standard error of the model's area and width ratio at the first b points.
+    sigma : ndarray (n, 2)
+        Standard error of the model's area and width ratio there.
     """
 
     units: NDArray[np.float64]
@@ -133,8 +130,8 @@ def survey(
 ) -> Survey:
     """Evaluate the surrogate for a mould at points (a power of two) that fill the region.
 
-    Predictions are means over the images of D4, like those on which bands were calibrated; bands are computed
-    at the first 32 points. `threads` compute them, each torch's on one; None: one for each processor.
+    Predictions and bands are those of `Surrogate.examine`. `threads` compute them, each torch's on one; None:
+    one for each processor.
 
     Raises
     ------
@@ -142,29 +139,21 @@ def survey(
         If the surrogate is not calibrated, or the mould holds no cell.
     """
     units = qmc.Sobol(3, seed=seed).random(points)
-    parameters = [parameters_at(unit) for unit in units]
     cast = surrogate.cast(mould)
 
-    def examined(point: CellParameters) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        found = surrogate.examine(cast, point)
+    def examined(unit: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        found = surrogate.examine(cast, parameters_at(unit))
         half = found.measure_bands.half[LEVELS.index(0.95), :2]
-        return np.asarray(half, dtype=np.float64), seen(found.values, cast, surrogate.threshold)
+        return seen(found.values, cast, surrogate.threshold), np.asarray(half, dtype=np.float64)
 
-    def predicted(part: Sequence[CellParameters]) -> list[NDArray[np.float64]]:
-        return [seen(each, cast, surrogate.threshold) for each in surrogate.predict(cast, part)]
-
-    bands, values = [], []
-    for half, measured in in_threads(examined, parameters[:BANDED], threads):
-        bands.append(half)
+    values, bands = [], []
+    for measured, half in in_threads(examined, list(units), threads):
         values.append(measured)
-        on_progress(f"{len(values)} of {points} predictions over the region")
-    parts = [parameters[start : start + TOGETHER] for start in range(BANDED, points, TOGETHER)]
-    for several in in_threads(predicted, parts, threads):
-        values += several
+        bands.append(half)
         on_progress(f"{len(values)} of {points} predictions over the region")
     found = np.array(values)
     found[np.isnan(found) & ~np.isnan(found).all(axis=0)] = 0.0  # a tissue torn at a section has no width
-    return Survey(units, found, np.array(bands) / norm.ppf(0.975))
+    return Survey(units, found, np.array(bands) / NORMAL)
 
 
 def infer(
@@ -184,7 +173,7 @@ def infer(
         )
     units = qmc.Sobol(3, seed=seed + 1).random(dense)
     values = interpolate(found.units, found.values, units)
-    bands = interpolate(found.units[: len(found.sigma)], found.sigma, units, smoothing=1e-2)
+    bands = interpolate(found.units, found.sigma, units, smoothing=1e-2)
     columns = target.columns
     variance = error**2 + np.clip(bands, found.sigma.min(axis=0), found.sigma.max(axis=0)) ** 2
     variance = (variance + interpolation_error(found)[:2] ** 2)[:, columns]
@@ -222,10 +211,13 @@ def interpolate(
 
 
 def interpolation_error(found: Survey) -> NDArray[np.float64]:
-    """Root mean square error (k,) at every fourth point of a survey, interpolated from the others."""
-    left = np.arange(len(found.units)) % 4 == 0
-    guess = interpolate(found.units[~left], found.values[~left], found.units[left])
-    return np.asarray(np.sqrt(((guess - found.values[left]) ** 2).mean(axis=0)))
+    """Root mean square error (k,) at the points of a survey, each interpolated from all others."""
+    others = ~np.eye(len(found.units), dtype=bool)
+    guess = [
+        interpolate(found.units[rest], found.values[rest], unit[None])[0]
+        for rest, unit in zip(others, found.units, strict=True)
+    ]
+    return np.asarray(np.sqrt(((np.array(guess) - found.values) ** 2).mean(axis=0)))
 
 
 def summarise(posterior: Posterior) -> dict[str, Any]:

@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 
 from raptor.fields.shape import shape_ratios
 from raptor.fitting.least_squares import STARTS, minimise
-from raptor.fitting.outline import deviations, outline_measure, outline_of
+from raptor.fitting.outline import OUTLINE_ERROR, deviations, outline_measure, outline_of
 from raptor.fitting.targets import PARAMETERS, Target, as_array, surrogate_densities, surrogate_measure
 from raptor.moulds.geometry import Mould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, CellParameters
+from raptor.parameters import BOUNDS, CellParameters
 from raptor.raster import density_threshold
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
-ERROR = 0.25  # l0; of an outline drawn on a photograph: a pixel of the paper's image
 SEARCHES = 3  # from different starting points: in a flat valley they end in different places
 
 
@@ -47,13 +46,13 @@ def recover(
     seeds = [seed + number for number in range(1, SEARCHES + 1)]
     by_ratios = [minimise(measure, target.residuals, starts=starts, seed=each, fine=fine) for each in seeds]
     by_outline = [minimise(coarse, np.asarray, starts=starts, seed=each, fine=apart) for each in seeds]
-    best = min(by_outline, key=lambda found: found.rss)
-    errors = deviations(apart, best, outline, ERROR)
+    nearest, best = (min(fits, key=lambda found: found.rss) for fits in (by_ratios, by_outline))
+    errors = deviations(apart, best, outline, OUTLINE_ERROR)
     return {
         "truth": asdict(truth),
         "target": asdict(target),
         "ratios": _outcome([found.parameters for found in by_ratios], truth)
-        | {"rank": by_ratios[0].rank, "rss": min(found.rss for found in by_ratios)},
+        | {"rank": nearest.rank, "rss": nearest.rss},
         "outline": _outcome([found.parameters for found in by_outline], truth)
         | {
             "rank": best.rank,
@@ -65,6 +64,6 @@ def recover(
 
 def _outcome(found: Sequence[CellParameters], truth: CellParameters) -> dict[str, Any]:
     """Fits and their distance from the true parameters."""
-    widths = np.array([bounds.upper - bounds.lower for bounds in (DELTA, KAPPA_NNN, KAPPA_NNNN)])
+    widths = np.array([bounds.upper - bounds.lower for bounds in BOUNDS.values()])
     errors = (as_array(found) - as_array([truth])) / widths
     return {"fits": [asdict(each) for each in found], "error": float(np.sqrt((errors**2).mean()))}

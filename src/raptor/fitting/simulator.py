@@ -50,7 +50,7 @@ class Simulator:
     @classmethod
     def configured(cls, content: Mapping[str, Any]) -> "Simulator":
         """From a configuration's layers, shells, tension, accuracy, pixels and seed."""
-        model = NetworkModel(content["layers"], tuple(content["shells"]), content["tension"])
+        model = NetworkModel.configured(content)
         return cls(model, content["accuracy"], content["pixels"], content["seed"] % 2**31)
 
     def seed_of(self, replicate: int) -> int:

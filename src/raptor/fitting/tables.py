@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from raptor.core.files import write_json
+from raptor.core.files import plain, write_json
 from raptor.fitting.targets import PARAMETERS, RATIOS, Target
 
 AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")
@@ -15,7 +15,7 @@ AGAIN = (*RATIOS, "rss", "area_ratio_std", "width_ratio_std", "rss_std")
 
 def write_fit(path: Path, content: Mapping[str, Any]) -> None:
     """Write a fit as JSON; numbers that are not finite become null."""
-    write_json(path, _plain(content))
+    write_json(path, plain(content))
 
 
 def tabulate(fits: Sequence[dict[str, Any]], simulators: Sequence[dict[str, Any]] = ()) -> pd.DataFrame:
@@ -75,16 +75,3 @@ def _mean_and_spread(name: str, fits: Sequence[Mapping[str, float]]) -> list[dic
         {"fit": f"{name}, {what}"} | dict(zip(PARAMETERS, found.tolist(), strict=True))
         for what, found in moments.items()
     ]
-
-
-def _plain(value: Any) -> Any:
-    """A value in the types of JSON."""
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

@@ -13,13 +13,21 @@ from numpy.typing import NDArray
 
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters, largest_kappa_nnnn
+from raptor.parameters import (
+    BOUNDS,
+    DELTA,
+    KAPPA_NNN,
+    KAPPA_NNNN,
+    Bounds,
+    CellParameters,
+    largest_kappa_nnnn,
+)
 
 if TYPE_CHECKING:  # tables and figures do not wait for torch
     from raptor.surrogate.inference import Surrogate
 
 RATIOS = ("area_ratio", "width_ratio")
-PARAMETERS = ("delta", "kappa_nnn", "kappa_nnnn")
+PARAMETERS = tuple(BOUNDS)
 
 Measure = Callable[[Sequence[CellParameters]], NDArray[np.float64]]
 """From n sets of parameters to measured quantities (n, k), mostly A/A0 and w/w0."""

@@ -50,14 +50,11 @@ class CastMould:
         Of the lattice.
     pixels : int
         Per side of the images.
-    clearance : float
-        Least distance of a cell from a wall, l0.
     """
 
     mould: Mould
     layers: int
     pixels: int
-    clearance: float = CLEARANCE
 
     @cached_property
     def image(self) -> MouldImage:
@@ -82,7 +79,7 @@ class CastMould:
     @cached_property
     def planes(self) -> list[NDArray[np.float64]]:
         """Sites (n, 2) of the even and of the odd layers, l0; raises as `cast_sites`."""
-        return _planes(self.mould, self.layers, self.clearance)
+        return _planes(self.mould, self.layers)
 
     @property
     def n_cells(self) -> int:
@@ -166,8 +163,8 @@ def thin_parts(mould: Mould) -> list[shapely.Polygon]:
     return [part for part in shapely.get_parts(joined) if part.buffer(-0.999 * THIN / 2).is_empty]
 
 
-def cast_sites(mould: Mould, layers: int, clearance: float = CLEARANCE) -> NDArray[np.float64]:
-    """Sites (cells, 3) inside a mould's depression by at least a clearance, l0, by layer, then y, then x.
+def cast_sites(mould: Mould, layers: int) -> NDArray[np.float64]:
+    """Sites (cells, 3) inside a mould's depression, by at least `CLEARANCE`, l0, by layer, then y, then x.
 
     Layer k lies at z = (k + 1/2) / sqrt 2; even layers have sites at integer x and y, odd layers at
     half-integer x and y, so that the point set has the full square symmetry about the image centre.
@@ -177,7 +174,7 @@ def cast_sites(mould: Mould, layers: int, clearance: float = CLEARANCE) -> NDArr
     RaptorError
         If there is none.
     """
-    return _stacked(_planes(mould, layers, clearance), layers)
+    return _stacked(_planes(mould, layers), layers)
 
 
 def _stacked(planes: Sequence[NDArray[np.float64]], layers: int) -> NDArray[np.float64]:
@@ -190,9 +187,9 @@ def _stacked(planes: Sequence[NDArray[np.float64]], layers: int) -> NDArray[np.f
     return np.concatenate(parts)
 
 
-def _planes(mould: Mould, layers: int, clearance: float) -> list[NDArray[np.float64]]:
+def _planes(mould: Mould, layers: int) -> list[NDArray[np.float64]]:
     """Sites (n, 2) of the even and of the odd layers; raises as `cast_sites`."""
-    planes = [_plane(mould, 0.5 * parity, clearance) for parity in range(min(layers, 2))]
+    planes = [_plane(mould, 0.5 * parity) for parity in range(min(layers, 2))]
     if not any(map(len, planes)):
         x0, y0, x1, y1 = mould.outline.bounds
         larger = FITTED / max(x1 - x0, y1 - y0)
@@ -224,11 +221,11 @@ def long_axis(mould: Mould) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return corners.mean(axis=0), sides[long] / 2
 
 
-def _plane(mould: Mould, shift: float, clearance: float) -> NDArray[np.float64]:
+def _plane(mould: Mould, shift: float) -> NDArray[np.float64]:
     """Sites (n, 2) of one layer, l0, by y, then x."""
     axis = np.arange(-HALF_SPAN, HALF_SPAN + 1) + shift
     points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    return points[mould.forbidden_depth(points) <= -clearance]
+    return points[mould.forbidden_depth(points) <= -CLEARANCE]
 
 
 def _across(middle: NDArray[np.float64], half: NDArray[np.float64]) -> shapely.LineString:

@@ -7,6 +7,7 @@ import shapely
 from raptor.moulds.cast import cast_sites
 from raptor.moulds.geometry import Mould, depth
 from raptor.moulds.random_moulds import GROUPS
+from raptor.parameters import LAYERS
 from raptor.symmetry import Element
 
 ALIKE = 0.25  # l0; largest distance between the walls of a mould and its symmetry image
@@ -65,7 +66,7 @@ class Summary:
         }
 
 
-def summarise(mould: Mould, layers: int = 7) -> Summary:
+def summarise(mould: Mould, layers: int = LAYERS) -> Summary:
     """Measure a mould, cast with a number of layers.
 
     Raises

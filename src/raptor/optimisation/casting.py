@@ -25,7 +25,7 @@ class QuickCast(CastMould):
     def planes(self) -> list[NDArray[np.float64]]:
         """Sites (n, 2) of the even and of the odd layers, l0; empty where there is none."""
         x = np.arange(-HALF_SPAN, HALF_SPAN + 1.0)
-        inner = self.mould.outline.buffer(-self.clearance)
+        inner = self.mould.outline.buffer(-CLEARANCE)
         shapely.prepare(inner)
         planes = []
         for parity in range(min(self.layers, 2)):
@@ -33,7 +33,7 @@ class QuickCast(CastMould):
             points = points[np.abs(points).max(axis=1) < IMAGE_SIZE / 2]
             points = points[shapely.contains_xy(inner, points[:, 0], points[:, 1])]
             for tether in self.mould.tethers:
-                points = points[~_within(tether, points, self.clearance)]
+                points = points[~_within(tether, points, CLEARANCE)]
             planes.append(points)
         return planes
 
@@ -52,9 +52,7 @@ class Candidate:
         return self.cast.n_cells
 
 
-def decode(
-    vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: int, clearance: float = CLEARANCE
-) -> Candidate:
+def decode(vector: NDArray[np.float64], spec: DesignSpec, layers: int, pixels: int) -> Candidate:
     """The mould of a vector (GENES,), cast with layers and imaged, or the violation that forbids it."""
     try:
         made = draft(vector, spec, layers)
@@ -65,7 +63,7 @@ def decode(
         return Candidate(None, violation)
     try:
         mould = Mould(made.outline, made.tethers, mm_per_l0=spec.mm_per_l0)
-        cast = QuickCast(mould, layers, pixels, clearance)
+        cast = QuickCast(mould, layers, pixels)
         return Candidate(cast if cast.image.depression.any() else None, 0.0)
     except RaptorError:
         return Candidate(None, BROKEN)

@@ -32,8 +32,9 @@ class Judgement:
     ----------
     objectives : ndarray (n, objectives)
         With their signs, worsened by caution.
-    violations : ndarray (n, 1 + constraints)
-        Of the process, then of each constraint; 0 or less where there is none.
+    violations : ndarray (n, 2 + constraints)
+        Of the process, of the distance from the training set, then of each constraint; 0 or less where there
+        is none.
     """
 
     objectives: NDArray[np.float64]
@@ -63,7 +64,7 @@ class Evaluator:
     def decode(self, vector: NDArray[np.float64]) -> Candidate:
         """The mould of a vector, or its violation."""
         known = self.surrogate
-        return decode(vector, self.spec, known.layers, known.pixels, known.clearance)
+        return decode(vector, self.spec, known.layers, known.pixels)
 
     def values(
         self, casts: Sequence[CastMould], samples: int | None = None

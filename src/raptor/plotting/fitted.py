@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from raptor.fitting.fitted import FittedTissue
-from raptor.fitting.posterior import BOUNDS
 from raptor.imaging.report import MeasuredPhotograph
-from raptor.parameters import PARAMETERS
+from raptor.parameters import BOUNDS, PARAMETERS
 from raptor.plotting.drawing import PARAMETER_LABELS, PREDICTED, SIMULATED, STYLED, THIRD, new_figure
 from raptor.plotting.overlay import BELOW, draw_measured
 from raptor.plotting.tissue import draw_tissue, height_of, write_rows

@@ -11,11 +11,10 @@ from raptor.moulds.geometry import Mould
 from raptor.moulds.library import MOULDS
 from raptor.moulds.raster import mould_image
 from raptor.moulds.reading import read_at_scale
-from raptor.surrogate.out_of_distribution import MOULD_DESCRIPTORS, mould_descriptors
+from raptor.surrogate.bands import USUAL
+from raptor.surrogate.out_of_distribution import MOULD_DESCRIPTORS, TrainingSet, mould_descriptors
 
 PIXELS = 256
-USUAL = 0.99
-"""Quantile of the drawn moulds' distances to their nearest neighbours that counts as near."""
 
 
 def describe_moulds(moulds: Iterable[Mould]) -> pd.DataFrame:
@@ -39,14 +38,13 @@ def coverage(drawn: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:
 
     Both tables are those of `describe_moulds`. Column `outside` names the descriptors below the smallest or
     above the largest of the drawn moulds. The distance, each descriptor over its deviation, is relative to
-    that which `USUAL` of the drawn moulds stay below from their nearest neighbour.
+    that which `bands.USUAL` of the drawn moulds stay below from their nearest neighbour.
     """
     names = list(MOULD_DESCRIPTORS)
     points, given = drawn[names].to_numpy(), known[names].to_numpy()
-    deviation = points.std(axis=0) + 1e-6
-    tree = KDTree(points / deviation)
-    among = np.asarray(tree.query(points / deviation, k=2)[0])
-    nearest, _ = tree.query(given / deviation)
+    training = TrainingSet(points)
+    among = np.asarray(KDTree(points / training.deviation).query(points / training.deviation, k=2)[0])
+    nearest = np.array([training.distance(point) for point in given])
     beyond = (given < points.min(axis=0)) | (given > points.max(axis=0))
     outside = [", ".join(np.array(names)[row]) for row in beyond]
     return known.assign(outside=outside, distance=nearest / float(np.quantile(among[:, 1], USUAL)))

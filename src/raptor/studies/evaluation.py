@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from raptor.core.errors import RaptorError
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.directors import alignment, anisotropy
 from raptor.fields.metrics import BULK, bulk_statistics, field_pearson, nrmse, pearson, vrmse, without_sign
@@ -104,8 +105,9 @@ def evaluate(
     """Errors and measures of every test sample of a stack, one row each.
 
     Columns: those that identify the sample; `vrmse_`, `masked_vrmse_`, `nrmse_` and `pearson_` of each field;
-    `tether_error`; each of `MEASURES`, simulated and predicted; with bands, the share of pixels that each
-    covers (`cover95_density`), whether it covers A/A0 and w/w0, and the flag.
+    `tether_error`; each of `MEASURES` and `posts_lost`, simulated and predicted; with bands, the share of
+    pixels that each covers (`cover95_density`), whether it covers each of `MEASURED`, its half width
+    (`area_ratio_band95`), `disagreement`, `distance`, the flag and `scores`.
     """
     rows, table = [], read_table(stack)
     for sample in read_samples(stack, table.rows("test")):
@@ -152,16 +154,27 @@ def _coverage(guess: Prediction, sample: Sample, row: Mapping[str, Any]) -> dict
 
 
 def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould]) -> pd.DataFrame:
-    """Seed-to-seed noise of each repeated mould, one row each, with the columns of `evaluate`.
+    """Seed-to-seed noise of each repeated tissue, one row each, with the columns of `evaluate`.
 
     Every pair of runs is compared as a prediction with its target; errors over sqrt 2 are those of the best
-    possible prediction, the mean of many runs. Of measures, the standard deviation.
+    possible prediction, the mean of many runs. Of measures, the standard deviation. A tissue whose own run
+    failed is left out.
+
+    Raises
+    ------
+    RaptorError
+        If no run of the stack was repeated.
     """
     table, again = read_table(stack), read_table(repeats)
+    runs, repeated = (list(zip(each.mould, each.parameters, strict=True)) for each in (table, again))
     rows = []
-    for mould in dict.fromkeys(again.mould):
-        first = [number for number, name in enumerate(table.mould) if name == mould]
-        others = [number for number, name in enumerate(again.mould) if name == mould]
+    for mould, parameters in dict.fromkeys(repeated):
+        first, others = (
+            [number for number, tissue in enumerate(tissues) if tissue == (mould, parameters)]
+            for tissues in (runs, repeated)
+        )
+        if not first:
+            continue
         samples = [*read_samples(stack, first), *read_samples(repeats, others)]
         pairs = [field_errors(a.fields, b.fields, b) for a, b in combinations(samples, 2)]
         row: dict[str, Any] = {"simulation": samples[0].simulation, "mould": mould, "runs": len(samples)}
@@ -172,6 +185,8 @@ def noise_floor(stack: Path, repeats: Path, moulds: Mapping[str, Mould]) -> pd.D
         measured = pd.DataFrame([sample_measures(s.fields, cast) for s in samples])
         row |= {name: float(measured[name].std(ddof=1)) for name in MEASURES}
         rows.append(row)
+    if not rows:
+        raise RaptorError(f"{repeats}: it repeats no run of {stack}; raise the repeats' runs")
     return pd.DataFrame(rows)
 
 

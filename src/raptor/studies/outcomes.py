@@ -11,7 +11,8 @@ BINS = 6
 def outcomes(simulated: pd.DataFrame, design: pd.DataFrame, tethers: pd.Series) -> pd.DataFrame:
     """Share of tissues that lost a tether, and median A/A0, by group of moulds and bin of Delta.
 
-    Groups are the families of a design that has them, else the moulds if each is simulated more than once.
+    Groups are the families of a design that has them (a mould without one is a group of its own), else the
+    moulds if each is simulated more than once.
 
     Parameters
     ----------
@@ -22,7 +23,7 @@ def outcomes(simulated: pd.DataFrame, design: pd.DataFrame, tethers: pd.Series) 
     """
     table = simulated.merge(design[["simulation", *(c for c in ("family",) if c in design)]], on="simulation")
     if "family" in table:
-        table["group"] = table["family"]
+        table["group"] = table["family"].fillna(table["mould"])
     else:
         repeated = table["mould"].value_counts().min() > 1
         table["group"] = table["mould"] if repeated else "all moulds"

@@ -92,7 +92,7 @@ def contraction(simulated: pd.DataFrame, predicted: pd.DataFrame | None = None) 
     deviation over seeds, NaN for a single one), `seeds`, `predicted`, `band95`, `difference` (predicted minus
     simulated), `within_band` (whether the band covers the mean) and
     `out_of_distribution`, the surrogate's own warning.
-    Without a prediction the last ones are empty.
+    Without a prediction the numbers among the last ones are empty, and the other two false.
     """
     if predicted is None:
         nothing = dict.fromkeys((*SHAPES, *(f"{name}_band95" for name in SHAPES)), np.nan)

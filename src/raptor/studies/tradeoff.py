@@ -171,7 +171,7 @@ class Trial:
             content["name"],
             mould,
             CellParameters(content["delta"], content["kappa_nnn"], content["kappa_nnnn"]),
-            NetworkModel(content["layers"], tuple(content["shells"]), content["tension"]),
+            NetworkModel.configured(content),
             content["pixels"],
             content["seed"] % 2**31,
         )

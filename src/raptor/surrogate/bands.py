@@ -24,6 +24,8 @@ MEASURED = ("area_ratio", "width_ratio", "alignment", "anisotropy")
 
 USUAL = 0.99  # share of the validation samples that are not flagged
 TINY = 1e-9
+NORMAL = 1.96
+"""Standard deviations of a normal error to either end of its 95 % band."""
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,11 @@ from raptor.dataset.scaling import scaled_parameters
 from raptor.dataset.stack import Sample, read_samples, read_table
 from raptor.fields.resample import block_average
 from raptor.moulds.cast import CastMould
+from raptor.surrogate.rules import BASELINES
 from raptor.symmetry import Element
 
 COARSE = 16
 """Pixels of the images by which moulds are compared."""
-
-BASELINES = ("nearest", "mean")
 
 
 def training_mean(stack: Path, examples: list[Example]) -> NDArray[np.float64]:

@@ -213,7 +213,8 @@ def split_examples(
             parts[splits[example.sample]].append(example)
     for name, part in parts.items():
         if not part:
-            raise RaptorError(f"there is no {name} example; raise design.simulations or design.{name}")
+            keys = "runs" if name == "train" else f"runs or its {name}"
+            raise RaptorError(f"there is no {name} example; raise the campaign's {keys}")
     training, validation = (ExampleSet(stacks, part, moulds, scaling, pixels) for part in parts.values())
     return training, validation
 

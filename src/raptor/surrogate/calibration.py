@@ -16,7 +16,7 @@ from raptor.fields.metrics import without_sign
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.geometry import Mould
 from raptor.raster import density_threshold
-from raptor.surrogate.bands import USUAL, Calibration, disagreement, fit_scale
+from raptor.surrogate.bands import MEASURED, USUAL, Calibration, disagreement, fit_scale
 from raptor.surrogate.ensemble import Ensemble, Realisations
 from raptor.surrogate.inference import Surrogate
 from raptor.surrogate.out_of_distribution import TrainingSet, descriptors
@@ -98,6 +98,9 @@ def calibrate(
     factor = fit_threshold(cases, simulated)
     own = fit_sample_threshold(cases, simulated) if surrogate.architecture.noise else factor
     errors, deviations = np.array([case.error(own * simulated) for case in cases]).swapaxes(0, 1)
+    lost = [name for name, error in zip(MEASURED, errors.T, strict=True) if not np.isfinite(error).any()]
+    if lost:
+        raise RaptorError(f"no validation sample has a {', '.join(lost)}; raise the campaign's validation")
     return Calibration(
         fit_scale(*np.concatenate(pixels, axis=1)),
         fit_scale(errors, deviations, np.ones_like(errors)),

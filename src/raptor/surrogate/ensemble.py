@@ -15,6 +15,9 @@ from raptor.fields.tethers import seen_held
 from raptor.moulds.cast import CastMould, once_per_cast
 from raptor.surrogate.constraints import allowed_density, project, reachable
 
+DETAIL = 128
+"""Pixels along a side at which local alignment is measured: block averages twice as wide mix directions."""
+
 
 @dataclass(frozen=True)
 class Realisations:
@@ -40,8 +43,10 @@ class Realisations:
     @classmethod
     def of(cls, cast: CastMould, fields: NDArray[np.float32], *, sampled: bool) -> "Realisations":
         """Those of fields (1 + n, 8, y', x'), the mean first."""
-        directions = np.array([(alignment(each, cast), anisotropy(each)) for each in fields])
-        return cls(cast, fields[:, 0], directions, sampled)
+        coarse = fields.shape[-1]
+        fine = deconvolve(fields, max(coarse, min(DETAIL, cast.pixels)))
+        directions = [alignment(each, cast) for each in fields], [anisotropy(each) for each in fine]
+        return cls(cast, fields[:, 0], np.array(directions).T, sampled)
 
     def of_mean(self, threshold: float) -> NDArray[np.float64]:
         """The mean's `bands.MEASURED` (4,); `threshold` is the density above which there is tissue."""

@@ -91,7 +91,9 @@ def load(folder: Path) -> Surrogate:
         layers, pixels, count = (int(content[name]) for name in ("layers", "pixels", "ensemble_size"))
         inputs = content.get("inputs", [])
     except (ValueError, KeyError, TypeError) as error:
-        raise RaptorError(f"{folder / MODEL} cannot be read: {error}") from error
+        raise RaptorError(
+            f"{folder / MODEL} cannot be read: {error}; give a folder with both files of one training"
+        ) from error
     if inputs != list(INPUTS):
         raise RaptorError(
             f"{folder / MODEL} was trained by another version, whose networks do not see "
@@ -121,4 +123,6 @@ def _read_tensors(path: Path) -> tuple[dict[str, Tensor], str | None]:
             identity = (file.metadata() or {}).get("identity")
         return load_file(path), identity
     except (OSError, SafetensorError) as error:
-        raise RaptorError(f"{path} cannot be read: {error}") from error
+        raise RaptorError(
+            f"{path} cannot be read: {error}; give a folder with both files of one training"
+        ) from error

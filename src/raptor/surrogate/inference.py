@@ -16,7 +16,7 @@ from raptor.fields.metrics import without_sign
 from raptor.fields.resample import coarse_images, deconvolve
 from raptor.fields.shape import shape_ratios
 from raptor.moulds.cast import CastMould
-from raptor.moulds.geometry import CLEARANCE, Mould
+from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
 from raptor.raster import density_threshold
 from raptor.surrogate.bands import Calibration
@@ -46,8 +46,6 @@ class Surrogate:
         Side of the predicted images; networks may work on block averages of these.
     calibration : Calibration or None
         Calibration of the errors, if measured.
-    clearance : float
-        Least distance of a cell from a wall in the tissues that they were trained on, l0.
     """
 
     members: tuple[Generator, ...]
@@ -56,7 +54,6 @@ class Surrogate:
     layers: int
     pixels: int
     calibration: Calibration | None = None
-    clearance: float = CLEARANCE
 
     def __post_init__(self) -> None:
         for member in self.members:  # channels last: convolutions take a quarter less time
@@ -88,13 +85,13 @@ class Surrogate:
             If a cast mould has other layers or pixels.
         """
         if isinstance(mould, Mould):
-            return CastMould(mould, self.layers, self.pixels, self.clearance)
+            return CastMould(mould, self.layers, self.pixels)
         if (mould.layers, mould.pixels) != (self.layers, self.pixels):
             raise RaptorError(
                 f"{mould.mould.name} is cast with {mould.layers} layers and {mould.pixels} pixels; this "
                 f"model is for {self.layers} layers and {self.pixels} pixels"
             )
-        return mould if mould.clearance == self.clearance else self.cast(mould.mould)
+        return mould
 
     def predict(
         self, mould: Mould | CastMould, cells: Sequence[CellParameters], *, averaged: bool = True
@@ -130,12 +127,7 @@ class Surrogate:
         RaptorError
             As `predict`, and if the surrogate is not calibrated.
         """
-        if self.calibration is None:
-            raise RaptorError(
-                "this model's errors were not calibrated, so it cannot give error bands; "
-                "use a model written by the workflow's rule assemble_model"
-            )
-        cast, calibration = self.cast(mould), self.calibration
+        cast, calibration = self.cast(mould), self.require_calibration()
         found = self.ensemble(cast, parameters)
         measures, deviations, held = found.realisations.measure(self.own_threshold)
         point = descriptors(cast.depression, cast.tethers, parameters)
@@ -199,6 +191,15 @@ class Surrogate:
         fields = torch.from_numpy(self.scaling.inverse(scaled.numpy()))
         back = torch.stack([apply(f, e.inverse) for f, e in zip(fields, elements, strict=True)])
         return full_fields(back.numpy(), cast)
+
+    def require_calibration(self) -> Calibration:
+        """The calibration; raises a RaptorError if there is none."""
+        if self.calibration is None:
+            raise RaptorError(
+                "this model's errors were not calibrated, so it cannot give error bands; "
+                "use a model written by the workflow's rule assemble_model"
+            )
+        return self.calibration
 
     def require_samples(self) -> None:
         """Raise a RaptorError if the networks give one mean."""

@@ -12,7 +12,7 @@ from scipy.ndimage import find_objects, label
 from scipy.spatial import KDTree
 
 from raptor.frame import pixel_size
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters
+from raptor.parameters import BOUNDS, DELTA, KAPPA_NNN, KAPPA_NNNN, Bounds, CellParameters
 
 
 class Descriptor(NamedTuple):
@@ -50,10 +50,9 @@ def descriptors(
     depression: NDArray[np.generic], tethers: NDArray[np.generic], parameters: CellParameters
 ) -> NDArray[np.float64]:
     """Descriptors (`DESCRIPTORS`,) of a mould (masks (y, x)) and its parameters, in parts of their ranges."""
-    values = (parameters.delta, parameters.kappa_nnn, parameters.kappa_nnnn)
     scaled = [
-        (value - bounds.lower) / (bounds.upper - bounds.lower)
-        for value, bounds in zip(values, (DELTA, KAPPA_NNN, KAPPA_NNNN), strict=True)
+        (getattr(parameters, name) - bounds.lower) / (bounds.upper - bounds.lower)
+        for name, bounds in BOUNDS.items()
     ]
     return np.concatenate([scaled, mould_descriptors(depression, tethers)])
 

@@ -12,12 +12,10 @@ from raptor.fields.tethers import posts_lost
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import CellParameters
-from raptor.surrogate.bands import LEVELS, MEASURED, Bands
+from raptor.surrogate.bands import LEVELS, MEASURED, NORMAL, Bands
 
 if TYPE_CHECKING:
     import xarray as xr
-
-WIDEST = 1.96  # standard deviations of a normal error in the widest band
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ class Prediction:
 
     @property
     def width_ratio(self) -> float:
-        """w/w0 of the central section; NaN where it holds no tissue as cast."""
+        """w/w0 of the central section; NaN where it holds no tissue as cast, or in no sample."""
         return float(self.measures[1])
 
     @property
@@ -165,7 +163,7 @@ class Prediction:
     @property
     def deviation(self) -> NDArray[np.float32]:
         """Standard deviation (8, y, x) of the fields' error: the half width of the 95 % band over 1.96."""
-        return np.asarray(self.field_bands.half[-1] / WIDEST)
+        return np.asarray(self.field_bands.half[-1] / NORMAL)
 
     @property
     def numbers(self) -> dict[str, float | int | bool | str | list[float]]:

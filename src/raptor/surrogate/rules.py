@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 
 from raptor.core.blocks import Block, Name, Positive
 
+BASELINES = ("nearest", "mean")
+"""Predictions without a network: see `surrogate.baselines`."""
 SHIPPED = Path(__file__).parent / "shipped"
 """The folder of the model that comes with the package."""
 

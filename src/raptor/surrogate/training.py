@@ -166,7 +166,7 @@ def _train_epoch(
     row["seconds"] = time.perf_counter() - started
     if not np.isfinite(list(row.values())).all():
         raise RaptorError(
-            f"training diverged in epoch {epoch} ({row}); lower surrogate.learning_rate and run again"
+            f"training diverged in epoch {epoch} ({row}); lower the model's learning_rate and run again"
         )
     return row
 

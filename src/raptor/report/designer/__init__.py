@@ -20,10 +20,11 @@ from raptor.core.version import __version__
 from raptor.fields import shape, tethers
 from raptor.frame import IMAGE_SIZE
 from raptor.moulds import cast, geometry
+from raptor.moulds.geometry import CLEARANCE
 from raptor.moulds.library import MOULDS
 from raptor.moulds.library.tissues import load_tissues
 from raptor.moulds.reading import read_mould
-from raptor.parameters import DELTA, KAPPA_NNN, KAPPA_NNNN
+from raptor.parameters import BOUNDS
 from raptor.plotting.drawing import DIVERGING, SEQUENTIAL
 from raptor.raster import DEEP, REACH, SIGMA, density_threshold
 from raptor.symmetry import FIELDS
@@ -36,7 +37,6 @@ PAGE, ENGINE = "page.html", "engine.wasm.gz"
 PLACES = ("<!-- model -->", "<!-- networks -->")
 """Where the page takes what it knows, and the networks: last, so that it is seen while they load."""
 LARGEST = 20 * 10**6  # bytes
-BOUNDS = {"delta": DELTA, "kappa_nnn": KAPPA_NNN, "kappa_nnnn": KAPPA_NNNN}
 CONSTANTS = {
     "IMAGE_SIZE": IMAGE_SIZE, "SIGMA": SIGMA, "DEEP": DEEP, "REACH": REACH,
     "STRICTLY": geometry.STRICTLY, "SMALLEST_TETHER": geometry.SMALLEST_TETHER,
@@ -107,14 +107,10 @@ def _bytes_apart(halves: bytes) -> bytes:
 def _about(surrogate: "Surrogate") -> dict[str, Any]:
     """What the page has to know besides the networks (designer/src/model.ts)."""
     from raptor.surrogate.constraints import TRACE
+    from raptor.surrogate.ensemble import DETAIL
     from raptor.surrogate.out_of_distribution import DESCRIPTORS
 
-    calibration = surrogate.calibration
-    if calibration is None:
-        raise RaptorError(
-            "this model's errors were not calibrated, so the page could give no bands; use a model written "
-            "by the workflow's rule assemble_model"
-        )
+    calibration = surrogate.require_calibration()
     points = base64.b64encode(np.asarray(calibration.training.points, "<f4").tobytes()).decode("ascii")
     descriptors = [
         {"name": name, "words": found.words, "unit": found.unit} for name, found in DESCRIPTORS.items()
@@ -127,7 +123,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "members": len(surrogate.members),
         "noise": [own.tolist() for own in surrogate.noise(8)] if surrogate.architecture.noise else [],
         "physical": surrogate.members[0].physical is not None,
-        "clearance": surrogate.clearance,
+        "clearance": CLEARANCE,
         "threshold": surrogate.threshold,
         "own_threshold": surrogate.own_threshold,
         "cast_threshold": density_threshold(surrogate.layers, surrogate.pixels),
@@ -136,7 +132,7 @@ def _about(surrogate: "Surrogate") -> dict[str, Any]:
         "calibration": calibration.as_json() | {"points": points},
         "descriptors": descriptors,
         "bounds": {name: {"lower": box.lower, "upper": box.upper} for name, box in BOUNDS.items()},
-        "constants": CONSTANTS | {"TRACE": TRACE},
+        "constants": CONSTANTS | {"TRACE": TRACE, "DETAIL": DETAIL},
         "moulds": [
             {"name": name, "feature": read_mould(name).as_feature()} for name in MOULDS
         ],

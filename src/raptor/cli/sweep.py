@@ -64,8 +64,12 @@ def sweep(
         save_picture(curve_figure(table, shape.name), picture)
     unusual = int((table["unusual"] != "").sum())
     said = f"; {unusual} unlike the training set, see its column 'unusual'" if unusual else ""
-    given |= {} if model is None else {"--model": opt.quote(model)}
-    given |= {"--accuracy": accuracy, "--seed": str(seed)}
+    changed = {
+        "--model": model,
+        "--accuracy": accuracy if accuracy != "standard" else None,
+        "--seed": seed or None,
+    }
+    given |= {option: opt.quote(value) for option, value in changed.items() if value is not None}
     then = "" if simulate else _then(given, opt.words(mould, scale, mm_per_l0, page), output, picture)
     opt.report(f"{output}: {len(table)} points{said}", {}, False, then)
 

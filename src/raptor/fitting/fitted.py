@@ -185,8 +185,8 @@ class FittedTissue:
             return "no parameters reproduce the measurement on this mould, so do not trust the fit"
         if self.rank < 3 and not self.intervals:
             return (
-                f"only {self.rank} combinations of the three parameters are determined: other parameters "
-                "fit equally well"
+                f"the measurement responds to only {self.rank} combinations of the three parameters: other "
+                "parameters fit equally well"
             )
         return ""
 

@@ -230,8 +230,10 @@ def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) ->
         xlabel="minutes of training, one network", ylabel="validation error (mean VRMSE)", yscale="log"
     )
     training.legend(frameon=False, fontsize=7)
-    known = table.dropna(subset=["all_ms"]).sort_values("all_ms", ignore_index=True)
-    for number, row in known.iterrows():  # names below and above by turns: two models may cost the same
+    known = table.dropna(subset=["all_ms"]).sort_values("all_ms")
+    for number, (_, row) in enumerate(
+        known.iterrows()
+    ):  # names below and above by turns: two models may cost the same
         cost.plot(row["all_ms"], row["vrmse_density"], "o", color=colours[row["model"]])
         cost.annotate(
             row["model"],

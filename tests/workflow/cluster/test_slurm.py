@@ -48,7 +48,7 @@ def test_jobs_are_submitted_a_cancelled_one_again_and_the_data_are_the_same(
     place = workplace("cluster")
     log = place.folder / "snakemake.log"
     command = place.command(
-        "--workflow-profile", str(PROFILE), "--slurm-init-seconds-before-status-checks", "3",
+        "--workflow-profile", str(PROFILE), "--slurm-init-seconds-before-status-checks", "1",
         "--slurm-no-account", "--slurm-keep-successful-logs", "--latency-wait", "5",
         "campaign_paper",
         configuration=variant(tmp_path, shard_size=4),

@@ -68,6 +68,11 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[str], None]]:
         yield advance
 
 
+def processors() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
 def in_threads(
     answer: Callable[[Item], Answer], items: Iterable[Item], threads: int | None = None
 ) -> Iterator[Answer]:
@@ -75,7 +80,7 @@ def in_threads(
 
     For numpy and torch, which compute without Python's lock, each on one thread.
     """
-    with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(threads or processors()) as pool:
         yield from pool.map(answer, items)
 
 

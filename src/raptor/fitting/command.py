@@ -17,7 +17,7 @@ from raptor.fitting.outline import OUTLINE_ERROR, Outline, deviations, drawn_out
 from raptor.fitting.posterior import RATIO_ERROR, Posterior, infer, summarise, survey
 from raptor.fitting.request import By, Request
 from raptor.fitting.simulator import ENOUGH, STEP, Simulator, descend_by_simulation
-from raptor.fitting.space_mapping import TOLERANCE, correct
+from raptor.fitting.space_mapping import correct
 from raptor.fitting.targets import PARAMETERS, Measure, Target, as_array, unit_of
 from raptor.moulds.geometry import Mould
 from raptor.moulds.reading import as_mould
@@ -31,6 +31,8 @@ LARGEST_RATIO = 1.5  # a tissue may swell; more is a mistake
 CORRECTED = 4  # of a fit by the simulator, one in so many simulations may correct the surrogate's fit
 SIMULATIONS: dict[str, int] = {"surrogate": 0, "corrected": 3, "simulator": 40}
 DRAWS = 200  # from the posterior, to draw
+EXACT = 1e-7  # residual sum of squares of ratios right to 0.0003, more than a surrogate knows
+TOLERANCE = 1e-3  # of a search by the surrogate; a flat valley is long, and less gains nothing
 
 
 def fit(
@@ -201,7 +203,7 @@ def _search_ratios(request: Request, surrogate: Surrogate, target: Target) -> tu
     predicted, residuals = request.predicted(averaged=True)
     found = descend(
         predicted, residuals, posterior.middle,
-        budget=10**9, step=SMALL_STEP, enough=0.0, tolerance=TOLERANCE,
+        budget=10**9, step=SMALL_STEP, enough=EXACT, tolerance=TOLERANCE,
     )  # fmt: skip
     request.on_progress("fit by the surrogate")
     if request.by == "surrogate":

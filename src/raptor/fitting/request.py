@@ -67,8 +67,8 @@ class Request:
         """The measured quantities of predicted tissues, and their residuals."""
         assert self.surrogate is not None
         return self.measure(
-            surrogate_densities(self.surrogate, self.mould, averaged=averaged),
-            surrogate_measure(self.surrogate, self.mould, averaged=averaged),
+            surrogate_densities(self.surrogate, self.mould, averaged=averaged, threads=None),
+            surrogate_measure(self.surrogate, self.mould, averaged=averaged, threads=None),
             self.surrogate.threshold,
         )
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raptor.core.jobs import in_threads, processors
 from raptor.moulds.cast import CastMould
 from raptor.moulds.geometry import Mould
 from raptor.parameters import (
@@ -95,10 +96,15 @@ def prior_density(units: NDArray[np.float64]) -> NDArray[np.float64]:
     return _highest(values_at(units)[:, 1]) - KAPPA_NNNN.lower
 
 
-def surrogate_measure(surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False) -> Measure:
-    """Area and width ratio of a mould's tissue by the surrogate, from one image or averaged over D4."""
+def surrogate_measure(
+    surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False, threads: int | None = 1
+) -> Measure:
+    """Area and width ratio of a mould's tissue by the surrogate, from one image or averaged over D4.
+
+    `threads` predict, each torch's on one; None: one for each processor.
+    """
     cast = surrogate.cast(mould)
-    densities_of = surrogate_densities(surrogate, cast, averaged=averaged)
+    densities_of = surrogate_densities(surrogate, cast, averaged=averaged, threads=threads)
 
     def measure(parameters: Sequence[CellParameters]) -> NDArray[np.float64]:
         return np.array([surrogate.ratios(density, cast) for density in densities_of(parameters)])
@@ -107,13 +113,18 @@ def surrogate_measure(surrogate: "Surrogate", mould: Mould | CastMould, *, avera
 
 
 def surrogate_densities(
-    surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False
+    surrogate: "Surrogate", mould: Mould | CastMould, *, averaged: bool = False, threads: int | None = 1
 ) -> Callable[[Sequence[CellParameters]], Any]:
-    """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate."""
+    """From n sets of parameters to densities (n, y, x) of a mould's tissue, by the surrogate, likewise."""
     cast = surrogate.cast(mould)
 
+    def predicted(part: Sequence[CellParameters]) -> NDArray[np.float32]:
+        return surrogate.predict(cast, part, averaged=averaged)[:, 0]
+
     def densities(parameters: Sequence[CellParameters]) -> NDArray[np.float32]:
-        return surrogate.predict(cast, parameters, averaged=averaged)[:, 0]
+        size = -(-len(parameters) // (threads or processors()))
+        parts = [parameters[start : start + size] for start in range(0, len(parameters), size)]
+        return np.concatenate(list(in_threads(predicted, parts, threads)))
 
     return densities
 

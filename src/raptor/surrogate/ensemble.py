@@ -44,7 +44,8 @@ class Realisations:
     def of(cls, cast: CastMould, fields: NDArray[np.float32], *, sampled: bool) -> "Realisations":
         """Those of fields (1 + n, 8, y', x'), the mean first."""
         coarse = fields.shape[-1]
-        fine = deconvolve(fields, max(coarse, min(DETAIL, cast.pixels)))
+        # By torch: numpy's own threads would get in the way of those that predict.
+        fine = deconvolve(torch.from_numpy(fields), max(coarse, min(DETAIL, cast.pixels))).numpy()
         directions = [alignment(each, cast) for each in fields], [anisotropy(each) for each in fine]
         return cls(cast, fields[:, 0], np.array(directions).T, sampled)
 

@@ -4,6 +4,7 @@ import pytest
 
 from raptor.fields.directors import directors
 from raptor.plotting import contraction_figure
+from raptor.studies.outcomes import outcomes
 from raptor.studies.sweep import contraction, differences, middle_points, read_panels, shown_deltas, tabulate
 from raptor.symmetry import FIELDS, Element, apply
 from tests.small import CAMPAIGN, build, design
@@ -23,6 +24,24 @@ def test_a_table_holds_the_ratios_of_each_simulation(campaign):
     assert table["ratio"].tolist() == [0.2, 0.5, 0.2, 0.5]
     assert table.groupby("delta")["area_ratio"].mean().is_monotonic_decreasing
     assert set(tabulate(CAMPAIGN / "fields.nc")["simulation"]) == set(range(24))
+
+
+def test_moulds_without_a_family_are_groups_of_their_own():
+    """As in a design of given moulds, of which a search wrote some."""
+    simulated = pd.DataFrame(
+        {
+            "simulation": [0, 1, 2],
+            "mould": ["a", "b", "c"],
+            "delta": 0.5,
+            "posts_lost": [0, 1, 0],
+            "area_ratio": 0.7,
+        }
+    )
+    design = pd.DataFrame({"simulation": [0, 1, 2], "family": ["designed", "designed", None]})
+    table = outcomes(simulated, design, pd.Series({"a": 2, "b": 2, "c": 0})).set_index("group")
+    assert table["simulations"].to_dict() == {"c": 1, "designed": 2}
+    assert table["losing_posts"].loc["designed"] == 0.5
+    assert np.isnan(table["losing_posts"].loc["c"])
 
 
 def test_tissues_are_drawn_near_the_papers_deltas(campaign):

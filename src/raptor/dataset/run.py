@@ -1,7 +1,6 @@
 """Simulation of the runs of a design, on the processor or on a GPU."""
 
 import logging
-import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -12,6 +11,7 @@ import numpy as np
 from raptor.condor.accuracy import accuracy_named
 from raptor.condor.simulate import Tissue, simulate
 from raptor.core.errors import RaptorError
+from raptor.core.jobs import processors
 from raptor.dataset.design import Run
 from raptor.moulds.geometry import Mould
 from raptor.parameters import NetworkModel
@@ -97,7 +97,7 @@ def _cast_all(moulds: list[Mould], model: NetworkModel) -> list["Cast | None"]:
     """Moulds cast for a batch, None for those that cannot be; in parallel, before the GPU is used."""
     if len(moulds) <= FEW:
         return [_cast(mould, model) for mould in moulds]
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+    with ProcessPoolExecutor(processors(), get_context("fork")) as pool:
         return list(pool.map(_cast, moulds, [model] * len(moulds), chunksize=8))
 
 

@@ -89,15 +89,20 @@ def fit(
     --------
     >>> found = fit("glial_1", area_ratio=0.81, width_ratio=0.80)
     """
-    if error is not None and not 0 < error < np.inf:
-        raise RaptorError(f"error is {error}; give a positive number, the standard error of the measurement")
-    start = _start(start, by)
+    error, start = _error(error), _start(start, by)
     target, mould = _target(area_ratio, width_ratio, outline), as_mould(mould)
     used = _surrogate(surrogate, layers) if start is None else None
     model = NetworkModel(used.layers if used is not None else LAYERS if layers is None else layers)
     simulator = Simulator(model, accuracy, used.pixels if used is not None else PIXELS, seed)
     budget = _budget(simulations, by)
     return _fit(Request(mould, target, simulator, used, start, by, budget, error, on_progress))
+
+
+def _error(error: float | None) -> float | None:
+    """The standard error of the measurement, checked."""
+    if error is not None and not 0 < error < np.inf:
+        raise RaptorError(f"error is {error}; give a positive number, the standard error of the measurement")
+    return error
 
 
 def _budget(simulations: int | None, by: By) -> int:

@@ -231,9 +231,8 @@ def models_figure(table: pd.DataFrame, histories: Mapping[str, pd.DataFrame]) ->
     )
     training.legend(frameon=False, fontsize=7)
     known = table.dropna(subset=["all_ms"]).sort_values("all_ms")
-    for number, (_, row) in enumerate(
-        known.iterrows()
-    ):  # names below and above by turns: two models may cost the same
+    # Names above and below by turns: two models may cost the same.
+    for number, (_, row) in enumerate(known.iterrows()):
         cost.plot(row["all_ms"], row["vrmse_density"], "o", color=colours[row["model"]])
         cost.annotate(
             row["model"],
